@@ -1,0 +1,187 @@
+"""What every command has in common: options, exit status, progress, JSON on stdout.
+
+A command module defines ``build_parser`` and ``run(options) -> Answer`` and calls
+``main = command(...)``; it parses, calls the library and prints, nothing else.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NoReturn, TypeVar
+
+from srs_opt.errors import InputError, NoAnswerError, SrsError
+
+T = TypeVar("T")
+FAULT = 70  # exit status of a bug (EX_SOFTWARE); 0, 1 and 2 are answers
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a command found: the JSON object, the words for a person, and whether it is a good answer."""
+
+    record: dict[str, Any]
+    summary: str
+    good: bool = True
+    files: tuple[Path, ...] = field(default=())
+
+
+class Parser(argparse.ArgumentParser):
+    """An argument parser whose complaints are one line."""
+
+    def error(self, message: str) -> NoReturn:
+        """Report bad usage on one line and exit with status 2."""
+        self.exit(2, f"{self.prog}: {message} (see {self.prog} --help)\n")
+
+
+def make_parser(
+    prog: str, description: str, example: str, *, robot: bool = True, sweep: bool = False
+) -> Parser:
+    """Return a parser with the options that all commands share."""
+    parser = Parser(
+        prog=prog,
+        description=description,
+        epilog=f"example:\n  {example}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    if robot:
+        parser.add_argument(
+            "--robot", type=Path, metavar="FILE", help="robot file (default: the built-in WPI SRS)"
+        )
+        parser.add_argument(
+            "--model", choices=("complex", "simplified"), default="complex", help="dynamic model"
+        )
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help="folder for the files (default: out/<command>)"
+    )
+    parser.add_argument(
+        "--json", action="store_true", help="print one JSON object on stdout and nothing else there"
+    )
+    parser.add_argument("--quiet", action="store_true", help="no progress, no messages")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of all randomness (default 0)")
+    if sweep:
+        parser.add_argument(
+            "--jobs",
+            type=positive_int,
+            default=os.cpu_count() or 1,
+            metavar="N",
+            help="processes (default: all cores)",
+        )
+        parser.add_argument(
+            "--cluster", metavar="ADDRESS", help="Dask scheduler to send the work to, host:port"
+        )
+    return parser
+
+
+def run_command(
+    parser: Parser, run: Callable[[argparse.Namespace], Answer], argv: list[str] | None = None
+) -> int:
+    """Parse, run, print; return the exit status (0 done, 1 no good answer, 2 bad input).
+
+    No traceback reaches a user; with SRS_OPT_TRACEBACK set, that of a bug does.
+    """
+    options = parser.parse_args(argv)
+    try:
+        if options.out is None:
+            options.out = Path("out") / parser.prog.split()[-1].split(".")[-1]
+        answer = run(options)
+        if options.json:
+            print(json.dumps(answer.record, allow_nan=False))
+        elif not options.quiet:
+            print(answer.summary)
+            for path in answer.files:
+                print(f"  wrote {path}")
+        sys.stdout.flush()
+        return 0 if answer.good else 1
+    except InputError as error:
+        print(f"{parser.prog}: {one_line(error)}", file=sys.stderr)
+        return 2
+    except (NoAnswerError, SrsError) as error:
+        print(f"{parser.prog}: {one_line(error)}", file=sys.stderr)
+        if options.json:
+            print(json.dumps({"error": one_line(error)}))
+        return 1
+    except KeyboardInterrupt:
+        print(f"\n{parser.prog}: interrupted; nothing half-written was left behind", file=sys.stderr)
+        return 130
+    except BrokenPipeError:
+        _close_output()
+        return 141
+    except OSError as error:
+        _close_output()
+        print(f"{parser.prog}: {error.filename or 'output'}: {error.strerror or error}", file=sys.stderr)
+        return 2
+    except Exception as error:
+        if os.environ.get("SRS_OPT_TRACEBACK"):
+            raise
+        print(
+            f"{parser.prog}: a fault of the program, {type(error).__name__}: {one_line(error)[:300]} "
+            "(SRS_OPT_TRACEBACK=1 shows where; please report it)",
+            file=sys.stderr,
+        )
+        return FAULT
+
+
+def _close_output() -> None:
+    """Send what is still in the buffer nowhere, so that the interpreter does not complain at exit."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def one_line(error: BaseException) -> str:
+    """Return the message of `error` on a single line."""
+    return " ".join(str(error).split())
+
+
+def say(options: argparse.Namespace, message: str) -> None:
+    """Tell the person something on stderr, unless --quiet."""
+    if not options.quiet:
+        print(message, file=sys.stderr, flush=True)
+
+
+def progress(
+    items: Iterable[T], options: argparse.Namespace, what: str, total: int | None = None
+) -> Iterator[T]:
+    """Iterate with a progress bar on stderr (none with --quiet)."""
+    from tqdm import tqdm
+
+    yield from tqdm(
+        items, desc=what, total=total, disable=options.quiet or None, file=sys.stderr, leave=False
+    )
+
+
+def positive_int(text: str) -> int:
+    """Parse a whole number above zero."""
+    try:
+        value = int(text)
+    except ValueError:
+        value = 0
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"expected a whole number above 0, found '{text}'")
+    return value
+
+
+def finite_float(text: str) -> float:
+    """Parse a finite number."""
+    import math
+
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"expected a finite number, found '{text}'")
+    return value
+
+
+def positive_float(text: str) -> float:
+    """Parse a number above zero."""
+    value = finite_float(text)
+    if value <= 0:
+        raise argparse.ArgumentTypeError(f"expected a number above 0, found '{text}'")
+    return value

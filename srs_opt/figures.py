@@ -1,0 +1,93 @@
+"""One style for all pictures: colour-blind safe, units on axes, readable at column width, vector and PNG."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import wraps
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from srs_opt.files import atomic_path
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+# Okabe and Ito's palette: distinguishable with any colour vision
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#999999")
+LEFT, RIGHT = COLOURS[0], COLOURS[1]
+SEQUENTIAL = "viridis"
+COLUMN_IN = 3.5  # width of a paper's column
+PAGE_IN = 7.2
+_STYLE: Any = {
+    "font.size": 8,
+    "axes.titlesize": 9,
+    "axes.labelsize": 8,
+    "legend.fontsize": 7,
+    "xtick.labelsize": 7,
+    "ytick.labelsize": 7,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.linewidth": 0.7,
+    "lines.linewidth": 1.2,
+    "legend.frameon": False,
+    "figure.constrained_layout.use": True,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "srs-opt",
+}
+
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def styled(draw: F) -> F:
+    """Decorate a drawing function: everything that it draws has the project's style."""
+
+    @wraps(draw)
+    def drawn(*args: Any, **options: Any) -> Any:
+        import matplotlib as mpl
+
+        with mpl.rc_context(_STYLE):
+            return draw(*args, **options)
+
+    return drawn  # type: ignore[return-value]
+
+
+@styled
+def new_figure(
+    rows: int = 1, columns: int = 1, *, width_in: float = COLUMN_IN, height_in: float = 2.6, **options: Any
+) -> tuple[Figure, Any]:
+    """Return a figure in the project's style and its axes (works without a display).
+
+    Options go to ``Figure.subplots`` (``sharex``, ``gridspec_kw`` ...).
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width_in, height_in), layout="constrained")
+    return figure, figure.subplots(rows, columns, **options)
+
+
+@styled
+def save_figure(figure: Figure, stem: Path | str, *, dpi: int = 200) -> tuple[Path, Path]:
+    """Write `figure` as ``stem.png`` and ``stem.svg``, atomically."""
+    stem = Path(stem)
+    targets = (stem.with_name(stem.name + ".png"), stem.with_name(stem.name + ".svg"))
+    for target in targets:
+        with atomic_path(target) as temporary:
+            metadata = {"Date": None} if target.suffix == ".svg" else None
+            figure.savefig(temporary, dpi=dpi, metadata=metadata)
+    return targets
+
+
+def draw_body(axes: Axes, x: Any, y: Any, width_m: float, **style: Any) -> None:
+    """Draw a body as the capsule of `width_m` along the centre line (x, y), in data units."""
+    import shapely
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path as Outline
+
+    shape = shapely.LineString(list(zip(x, y))).buffer(width_m / 2, quad_segs=8)
+    rings = [shape.exterior, *shape.interiors]
+    outline = Outline.make_compound_path(*[Outline(ring.coords, closed=True) for ring in rings])
+    axes.add_patch(PathPatch(outline, **{"linewidth": 0, "alpha": 0.6, **style}))
+    axes.update_datalim([shape.bounds[:2], shape.bounds[2:]])
+    axes.autoscale_view()

@@ -1,0 +1,110 @@
+"""``python -m srs_opt.import_motive TAKE.csv --trials FILE``: Motive takes become a data set."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from srs_opt.command import Answer, Parser, finite_float, make_parser, positive_float, run_command, say
+
+
+def build_parser() -> Parser:
+    """Return the command's parser."""
+    parser = make_parser(
+        "python -m srs_opt.import_motive",
+        "Import OptiTrack Motive CSV exports: markers are found, ordered tail to head, put on the valves'\n"
+        "clock and written as a measured data set. Labels may be unordered, swap, or be missing.\n"
+        "Columns of the list of trials: trial, frequency_hz, pressure_kpa, offset, phase_lag_rad; optional\n"
+        "take (a take's name; default: the trial's), valve_start_s (on the take's clock), duration_s,\n"
+        "tether, floor, replicate_of, kind.",
+        "python -m srs_opt.import_motive takes/*.csv --trials trials.csv --robot robot.yaml --out mine",
+    )
+    parser.add_argument("takes", type=Path, nargs="+", metavar="TAKE.csv", help="Motive CSV export(s)")
+    parser.add_argument("--trials", type=Path, required=True, metavar="FILE", help="list of trials (CSV)")
+    parser.add_argument("--name", help="name of the data set (default: the output folder's)")
+    parser.add_argument("--head-marker", metavar="LABEL", help="head's marker (default: the end that leads)")
+    parser.add_argument(
+        "--up",
+        default="auto",
+        metavar="AXIS",
+        help="up in Motive's axes: auto, x, y, z, --up=-y, ... (default auto)",
+    )
+    parser.add_argument(
+        "--points",
+        choices=("auto", "markers", "bodies"),
+        default="auto",
+        help="follow markers or rigid bodies",
+    )
+    parser.add_argument(
+        "--valve-start",
+        type=finite_float,
+        metavar="S",
+        help="valves' start on the take's clock, s (default: found)",
+    )
+    parser.add_argument(
+        "--marker-sd", type=positive_float, metavar="M", help="noise per coordinate, m (default: estimated)"
+    )
+    return parser
+
+
+def run(options: argparse.Namespace) -> Answer:
+    """Import, write, check what was written."""
+    from srs_opt.errors import InputError
+    from srs_opt.measurement.dataset import write_dataset
+    from srs_opt.measurement.motive import read_take
+    from srs_opt.measurement.motive_import import ImportOptions, import_takes, read_trial_list
+    from srs_opt.measurement.validate import problems
+    from srs_opt.robot import load_robot
+
+    if (options.out / "dataset.yaml").exists():
+        raise InputError(f"{options.out}: already holds a data set; choose another folder with --out")
+    robot = load_robot(options.robot)
+    rows = read_trial_list(options.trials)
+    takes = [read_take(path) for path in options.takes]
+    settings = ImportOptions(
+        head_marker=options.head_marker,
+        up=options.up,
+        points=options.points,
+        valve_start_s=options.valve_start,
+        marker_sd_m=options.marker_sd,
+    )
+    name = options.name or options.out.resolve().name
+    dataset, notes = import_takes(takes, rows, robot, name, settings)
+    write_dataset(dataset, options.out)
+    for note in notes:
+        for warning in note.warnings:
+            say(options, f"warning: trial '{note.trial}': {warning}")
+    listed = problems(options.out)
+    for problem in listed:
+        say(options, f"{problem.severity}: {options.out}/{problem}")
+    errors = [p for p in listed if p.severity == "error"]
+    record = {
+        "dataset": str(options.out),
+        "marker_sd_m": dataset.marker_sd_m,
+        "trials": [
+            {
+                "trial": note.trial,
+                "take": note.take,
+                "valve_start_s": note.valve_start_s,
+                "valve_start_sd_s": note.valve_start_sd_s,
+                "lost_fraction": note.lost_fraction,
+                "ghosts": note.ghosts,
+                "warnings": list(note.warnings),
+            }
+            for note in notes
+        ],
+        "errors": len(errors),
+    }
+    lines = [
+        f"  {n.trial}: valves start at {n.valve_start_s:.4f} s of take '{n.take}'"
+        + (f" (sd {n.valve_start_sd_s:.4f} s, found from the first motion)" if n.valve_start_sd_s else "")
+        + f", {100 * n.lost_fraction:.1f} % lost, {n.ghosts} ghosts"
+        for n in notes
+    ]
+    summary = "\n".join([f"{len(notes)} trials imported, noise {1e3 * dataset.marker_sd_m:.2f} mm", *lines])
+    return Answer(record, summary, good=not errors, files=(options.out / "dataset.yaml",))
+
+
+if __name__ == "__main__":
+    sys.exit(run_command(build_parser(), run))

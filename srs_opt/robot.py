@@ -1,0 +1,223 @@
+"""The robot: a frozen, validated description read from YAML.
+
+The built-in robot is the WPI SRS of the paper; its file marks every value as
+published (Table 2) or assumed.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from importlib import resources
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from srs_opt.document import Document, load_schema, parse_yaml, read_yaml, validate
+from srs_opt.errors import InputError
+
+EffectSpec = Mapping[str, Any]
+MIN_LINKS, MAX_LINKS = 3, 64
+
+
+@dataclass(frozen=True)
+class Robot:
+    """A pneumatic soft snake; every field is a key of the robot file.
+
+    Attributes
+    ----------
+    links : int
+        Wheel pairs N, numbered tail (1) to head (N); there are N-1 bending segments.
+    segment_length_m, gap_length_m : float
+        Pressure chamber l and unactuated gap L_o; the pitch is l + L_o (paper, Fig. 11).
+    link_mass_kg, link_inertia_kg_m2 : float
+        Mass m and own inertia J of each link (Table 1).
+    friction_law : {"per_axis", "cone"}
+        Coulomb friction per wheel axis, or on the friction cone (Hu and Shelley).
+    friction_tangential, friction_normal : float
+        mu_t along and mu_n across the wheels (Table 2).
+    friction_speed_m_s : float
+        Smoothing speed v_s of the sign function; numerical, not physical.
+    curvature_per_pressure_1_m_kpa : float
+        C0 over pressure in the step response (14).
+    tau1_s, tau2_s : float
+        Time constants of (14).
+    effects : tuple of dict
+        Effects beyond the paper's model, ``{"name": ..., parameter: value, ...}``.
+    relative_sd : dict
+        Standard deviation over value, per parameter.
+    sources : dict
+        Parameter -> published, assumed, bench or calibrated.
+    """
+
+    name: str = "unnamed"
+    links: int = 5
+    segment_length_m: float = 0.037
+    gap_length_m: float = 0.012
+    link_mass_kg: float = 0.030
+    link_inertia_kg_m2: float = 1e-6
+    body_width_m: float = 0.040
+    friction_law: str = "per_axis"
+    friction_tangential: float = 0.043
+    friction_normal: float = 0.57
+    friction_speed_m_s: float = 0.002
+    gravity_m_s2: float = 9.81
+    curvature_per_pressure_1_m_kpa: float = 0.35
+    tau1_s: float = 0.08
+    tau2_s: float = 0.05
+    valve_delay_s: float = 0.0
+    effects: tuple[EffectSpec, ...] = ()
+    relative_sd: Mapping[str, float] = field(default_factory=dict)
+    sources: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def segments(self) -> int:
+        """Number of bending segments, N - 1."""
+        return self.links - 1
+
+    @property
+    def pitch_m(self) -> float:
+        """Distance between neighbouring links of the straight robot, l + L_o."""
+        return self.segment_length_m + self.gap_length_m
+
+    @property
+    def length_m(self) -> float:
+        """Length of the straight robot from the first wheel pair to the last, plus the body's round ends."""
+        return self.segments * self.pitch_m + self.body_width_m
+
+    @property
+    def max_curvature_1_m(self) -> float:
+        """Curvature at which a segment has bent by 2 pi and would meet itself."""
+        return 2 * math.pi / self.segment_length_m
+
+    def with_values(self, **changes: Any) -> Robot:
+        """Return a validated copy with some fields changed."""
+        record = {**self.to_record(), **changes}
+        return robot_from_document(Document(f"robot '{self.name}'", _plain(record)))
+
+    def to_record(self) -> dict[str, Any]:
+        """Return the robot as the mapping that a robot file holds."""
+        return {f.name: _plain(getattr(self, f.name)) for f in dataclasses.fields(self)}
+
+    def fingerprint(self) -> str:
+        """Return a hash of everything that bears on motion (not name, sources or deviations)."""
+        record = self.to_record()
+        for key in ("name", "sources", "relative_sd"):
+            del record[key]
+        if self.effects:
+            from srs_opt.model.effects import own_definitions
+
+            definitions = own_definitions([str(spec["name"]) for spec in self.effects])
+            record |= {f"definition of {name}": digest for name, digest in definitions.items()}
+        text = json.dumps(record, sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+    def __reduce__(self) -> tuple[Any, ...]:  # read-only effects do not pickle; worker processes need robots
+        return _restored, (self.to_record(),)
+
+    def __hash__(self) -> int:
+        return hash(json.dumps(self.to_record(), sort_keys=True))
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, (tuple, list)):
+        return [_plain(v) for v in value]
+    if hasattr(value, "item"):  # numpy scalars
+        return value.item()
+    return value
+
+
+def _restored(record: dict[str, Any]) -> Robot:
+    record["effects"] = tuple(MappingProxyType(spec) for spec in record["effects"])
+    return Robot(**record)
+
+
+def robot_from_document(document: Document) -> Robot:
+    """Validate a parsed robot file and return the robot.
+
+    Raises
+    ------
+    InputError
+        Naming the file, the line and the key, for unknown keys, wrong types and impossible values.
+    """
+    validate(document, load_schema("srs_opt.robots", "robot.schema.json"))
+    record = dict(document.value)
+    parameters = {f.name for f in dataclasses.fields(Robot)} - {"name", "effects", "relative_sd", "sources"}
+    for table in ("relative_sd", "sources"):
+        for key in record.get(table, {}):
+            if key not in parameters:
+                raise document.error((table, key), "is not a parameter of the robot")
+    if "effects" in record:
+        from srs_opt.model.effects import check_effects
+
+        record["effects"] = check_effects(document, record["effects"], int(record.get("links", 5)))
+    for key, value in record.items():
+        if isinstance(value, (int, float)):
+            record[key] = int(value) if key == "links" else float(value)
+    robot = Robot(**record)
+    _check_body(document, robot)
+    if robot.friction_normal < robot.friction_tangential:
+        raise document.error(
+            ("friction_normal",),
+            f"must be at least friction_tangential ({robot.friction_tangential:g}): "
+            "wheels slide across more easily than they roll?",
+        )
+    return robot
+
+
+def _check_body(document: Document, robot: Robot) -> None:
+    """Refuse effects that leave a link without mass or a gap without length."""
+    for index, spec in enumerate(robot.effects):
+        if spec["name"] == "head_mass" and robot.link_mass_kg + spec["extra_kg"] <= 0:
+            raise document.error(
+                ("effects", index, "extra_kg"),
+                f"leaves the head {robot.link_mass_kg + spec['extra_kg']:g} kg; its mass must stay above 0",
+            )
+        if spec["name"] == "gap_length" and robot.gap_length_m + spec["extra_m"] < 0:
+            raise document.error(
+                ("effects", index, "extra_m"),
+                f"leaves gaps of {robot.gap_length_m + spec['extra_m']:g} m; they must stay at least 0",
+            )
+
+
+def load_robot(path: Path | str | None = None) -> Robot:
+    """Read a robot file; without one, return the built-in WPI SRS.
+
+    Raises
+    ------
+    InputError
+        If the file is not a valid robot file.
+    """
+    if path is None:
+        return wpi_srs()
+    return robot_from_document(read_yaml(path, "a robot file (YAML)"))
+
+
+@lru_cache(maxsize=1)
+def wpi_srs() -> Robot:
+    """Return the paper's robot; see its file for which values are published and which assumed."""
+    text = resources.files("srs_opt.robots").joinpath("wpi_srs.yaml").read_text(encoding="utf-8")
+    return robot_from_document(parse_yaml(text, "srs_opt/robots/wpi_srs.yaml", "a robot file"))
+
+
+def save_robot(robot: Robot, path: Path | str) -> Path:
+    """Write `robot` as a robot file (atomically); lists and tables in readable YAML."""
+    import yaml
+
+    from srs_opt.files import write_text
+
+    record = robot.to_record()
+    for key in ("relative_sd", "sources"):
+        if not record[key]:
+            del record[key]
+    return write_text(path, yaml.safe_dump(record, sort_keys=False, width=100))
+
+
+__all__ = ["InputError", "Robot", "load_robot", "robot_from_document", "save_robot", "wpi_srs"]
