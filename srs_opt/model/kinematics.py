@@ -1,0 +1,171 @@
+"""Chain geometry: links joined by arcs (pressure chambers) and gaps.
+
+theta_{i+1} = theta_i + l kappa_i, and the chord of an arc is l S(l kappa/2) with
+S(h) = sin(h)/h: the paper's (3) without its 0/0. Half of each straight gap stands
+at either end of its arc, along that link (paper, Fig. 11); seen from the segment's
+middle both halves lean alike, so link follows link along the mean of their headings.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import casadi as ca
+
+_SERIES_RADIUS = 0.3  # below it the Taylor series of sinc is exact to rounding
+
+
+# Taylor coefficients in h^2 of sin(h)/h and of its derivative over h
+_SINC = tuple((-1) ** k / math.factorial(2 * k + 1) for k in range(7))
+_SLOPE = tuple((-1) ** k * 2 * k / math.factorial(2 * k + 1) for k in range(1, 8))
+
+
+def _polynomial(coefficients: tuple[float, ...], z: ca.SX) -> ca.SX:
+    value = ca.SX(coefficients[-1])
+    for c in reversed(coefficients[:-1]):
+        value = value * z + c
+    return value
+
+
+def sinc(h: ca.SX) -> ca.SX:
+    """Return sin(h)/h, smooth through zero (so are its derivatives)."""
+    small = ca.fabs(h) < _SERIES_RADIUS
+    safe = ca.if_else(small, 1.0, h)
+    return ca.if_else(small, _polynomial(_SINC, h * h), ca.sin(safe) / safe)
+
+
+@dataclass(frozen=True)
+class Chain:
+    """A vector and an angle per link in the robot's own frame: shape, or its rates.
+
+    Attributes
+    ----------
+    x, y : SX (N, 1)
+        Link positions, m (origin at the centre of mass).
+    angle : SX (N, 1)
+        Link headings relative to the mean heading, rad.
+    """
+
+    x: ca.SX
+    y: ca.SX
+    angle: ca.SX
+
+
+@dataclass(frozen=True)
+class Shape(Chain):
+    """The chain of given curvatures, with what its rates share with it.
+
+    Attributes
+    ----------
+    cos, sin : SX (N, 1)
+        Of the links' headings.
+    rates : Chain
+        Time derivatives for the given curvature rates, m/s and rad/s.
+    """
+
+    cos: ca.SX
+    sin: ca.SX
+    rates: Chain
+
+
+def arc(length: ca.SX, curvature: ca.SX, heading: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """Return the chord (dx, dy) of an arc that starts along `heading`, and the heading at its end."""
+    turn = length * curvature
+    chord = length * sinc(turn / 2)
+    middle = heading + turn / 2
+    return chord * ca.cos(middle), chord * ca.sin(middle), heading + turn
+
+
+def _sinc_and_slope(h: ca.SX, cos: ca.SX, sin: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """Return sin(h)/h and its derivative, smooth through zero, given cos(h) and sin(h)."""
+    small = ca.fabs(h) < _SERIES_RADIUS
+    inverse = 1 / ca.if_else(small, 1.0, h)
+    value = ca.if_else(small, _polynomial(_SINC, h * h), sin * inverse)
+    return value, ca.if_else(small, h * _polynomial(_SLOPE, h * h), (cos - value) * inverse)
+
+
+def _chord(
+    kappa: ca.SX, segment_length: ca.SX, gap_length: ca.SX, gap_ratio: ca.SX | float
+) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
+    """Return a segment's chord from link to link, its derivative by kappa, and cos, sin of half its turn.
+
+    Half gap, arc and half gap are symmetric, so the chord lies along the mean of the two links' headings.
+    """
+    h = segment_length * kappa / 2
+    cos, sin = ca.cos(h), ca.sin(h)
+    arc_chord, arc_slope = _sinc_and_slope(h, cos, sin)
+    bend, gap_chord, gap_slope = gap_length * gap_ratio / 4, ca.SX(1), ca.SX(0)
+    if not ca.SX(gap_ratio).is_zero():
+        gap_cos, gap_sin = ca.cos(bend * kappa), ca.sin(bend * kappa)
+        gap_chord, gap_slope = _sinc_and_slope(bend * kappa, gap_cos, gap_sin)
+        middle_cos, middle_sin = cos * gap_cos - sin * gap_sin, sin * gap_cos + cos * gap_sin
+        cos, sin = middle_cos * gap_cos - middle_sin * gap_sin, middle_sin * gap_cos + middle_cos * gap_sin
+    else:
+        middle_cos, middle_sin = cos, sin
+    half = segment_length / 2
+    chord = segment_length * arc_chord + gap_length * gap_chord * middle_cos
+    slope = segment_length * half * arc_slope + gap_length * (
+        bend * gap_slope * middle_cos - (half + bend) * gap_chord * middle_sin
+    )
+    return chord, slope, cos, sin
+
+
+def body_frame_chain(
+    kappa: ca.SX,
+    mass: ca.SX,
+    segment_length: ca.SX,
+    gap_length: ca.SX,
+    gap_ratio: ca.SX | float = 0.0,
+    dkappa: ca.SX | None = None,
+) -> Shape:
+    """Return the chain in the robot's frame: origin at the centre of mass, x along the mean heading.
+
+    Parameters
+    ----------
+    kappa : SX (N-1, 1)
+        Segment curvatures, 1/m.
+    mass : SX (N, 1)
+        Link masses, kg (they weigh the centre of mass).
+    segment_length, gap_length : SX
+        Chamber l and gap L_o, m.
+    gap_ratio : SX
+        Curvature of the gaps over that of their chamber (0: straight gaps).
+    dkappa : SX (N-1, 1), optional
+        Rates of the curvatures, 1/(m s); without, the shape is at rest.
+    """
+    dkappa = ca.SX.zeros(kappa.shape) if dkappa is None else dkappa
+    turn_per_kappa = segment_length + gap_length * gap_ratio
+    angle = _headings(turn_per_kappa * kappa)
+    angle_rate = _headings(turn_per_kappa * dkappa)
+    c, s = ca.cos(angle[0]), ca.sin(angle[0])
+    x, y, x_rate, y_rate = ([ca.SX(0)] for _ in range(4))
+    cosines, sines = [c], [s]
+    for i in range(kappa.shape[0]):
+        chord, slope, c_half, s_half = _chord(kappa[i], segment_length, gap_length, gap_ratio)
+        # two half turns by complex products: no further cosine along the chain
+        c, s = c * c_half - s * s_half, s * c_half + c * s_half
+        middle_rate = (angle_rate[i] + angle_rate[i + 1]) / 2
+        along, across = slope * dkappa[i], chord * middle_rate
+        x.append(x[-1] + chord * c)
+        y.append(y[-1] + chord * s)
+        x_rate.append(x_rate[-1] + along * c - across * s)
+        y_rate.append(y_rate[-1] + along * s + across * c)
+        c, s = c * c_half - s * s_half, s * c_half + c * s_half
+        cosines.append(c)
+        sines.append(s)
+    weight = mass * (1 / ca.sum1(mass))
+    centred = [v - ca.dot(weight, v) for v in (ca.vertcat(*p) for p in (x, y, x_rate, y_rate))]
+    rates = Chain(centred[2], centred[3], angle_rate)
+    return Shape(centred[0], centred[1], angle, ca.vertcat(*cosines), ca.vertcat(*sines), rates)
+
+
+def _headings(turns: ca.SX) -> ca.SX:
+    """Return the links' headings, mean zero, for the turns (N-1, 1) from each link to the next."""
+    from_tail = ca.vertcat(0, ca.cumsum(turns))
+    return from_tail - ca.sum1(from_tail) / from_tail.shape[0]
+
+
+def chord_length(kappa: ca.SX, segment_length: ca.SX) -> ca.SX:
+    """Return the moment arms l_i of the paper's (3): chords of the arcs, gaps not included."""
+    return segment_length * sinc(segment_length * kappa / 2)

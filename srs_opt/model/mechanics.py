@@ -1,0 +1,151 @@
+"""From curvature and body velocity to forces: what both models of the paper share.
+
+The body's state is its pose (x, y of the centre of mass, mean heading psi), the velocity
+(u_x, u_y) of the centre of mass in the robot's frame, and a yaw momentum. With momenta as
+states no model needs the second derivative of the curvature, so the right-hand side stays
+continuous where a valve switches.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+import casadi as ca
+
+from srs_opt.model.effects.effect import LinkState
+from srs_opt.model.friction import FRICTION_LAWS
+from srs_opt.model.kinematics import Chain, body_frame_chain
+from srs_opt.model.parameters import Parameters
+
+
+@dataclass(frozen=True)
+class Forces:
+    """Ground and tether forces on the links, in the robot's frame, and what they dissipate.
+
+    Attributes
+    ----------
+    x, y : SX (N, 1)
+        Force on each link, N.
+    friction_power : SX
+        Power that friction takes out of the motion, W (not negative for passive friction).
+    power : SX
+        Power of all external forces on the robot, W.
+    """
+
+    x: ca.SX
+    y: ca.SX
+    friction_power: ca.SX
+    power: ca.SX
+
+
+class Mechanics(ABC):
+    """Kinematics, inertia and forces of one structure; a model adds its yaw equation."""
+
+    def __init__(self, parameters: Parameters) -> None:
+        p = self.parameters = parameters
+        self.links = n = parameters.structure.links
+        self.kappa = ca.SX.sym("kappa", n - 1)
+        self.dkappa = ca.SX.sym("dkappa", n - 1)
+        gap, ratio = p["gap_length_m"], ca.SX(0)
+        self.mass = p["link_mass_kg"] * ca.SX.ones(n, 1)
+        self.inertia = p["link_inertia_kg_m2"] * ca.SX.ones(n, 1)
+        for effect, e in p.effects:
+            gap = gap + effect.gap_extra(e) if effect.gap_extra else gap
+            ratio = ratio + effect.gap_ratio(e) if effect.gap_ratio else ratio
+            self.mass = self.mass + effect.extra_mass(e, n) if effect.extra_mass else self.mass
+        self.gap_length, self.gap_ratio = gap, ratio
+        self.chain = body_frame_chain(self.kappa, self.mass, p["segment_length_m"], gap, ratio, self.dkappa)
+        self.chain_rate = self.chain.rates
+
+    @abstractmethod
+    def yaw_inertia(self) -> ca.SX:
+        """Return the inertia that turns yaw rate into yaw momentum, kg m^2."""
+
+    @abstractmethod
+    def yaw_momentum_of_shape(self) -> ca.SX:
+        """Return the yaw momentum of the changing shape alone (yaw rate zero), kg m^2/s."""
+
+    @abstractmethod
+    def yaw_momentum_rate(self, forces: Forces, yaw_rate: ca.SX) -> ca.SX:
+        """Return the rate of the yaw momentum, N m."""
+
+    def yaw_rate(self, momentum: ca.SX) -> ca.SX:
+        """Return the rate of the mean heading, rad/s."""
+        return (momentum - self.yaw_momentum_of_shape()) * (1 / self.yaw_inertia())
+
+    def total_mass(self) -> ca.SX:
+        """Return the robot's mass, kg."""
+        return ca.sum1(self.mass)
+
+    def link_velocities(self, u_x: ca.SX, u_y: ca.SX, yaw_rate: ca.SX) -> Chain:
+        """Return the links' velocities in the robot's frame (m/s) and their turn rates (rad/s)."""
+        c, d = self.chain, self.chain_rate
+        return Chain(u_x - yaw_rate * c.y + d.x, u_y + yaw_rate * c.x + d.y, yaw_rate + d.angle)
+
+    def forces(self, pose: ca.SX, u_x: ca.SX, u_y: ca.SX, yaw_rate: ca.SX) -> Forces:
+        """Return the forces on the links for a pose and a body velocity.
+
+        Friction on link i is -(normal force) [mu_t d_t t + mu_n d_n n] in wheel axes, with the
+        smoothed sliding directions d of the robot's friction law (paper, Fig. 2 and Table 1).
+        """
+        p, n = self.parameters, self.links
+        v = self.link_velocities(u_x, u_y, yaw_rate)
+        normal = self.mass * p["gravity_m_s2"]
+        c, s = self.chain.cos, self.chain.sin
+        for effect, e in p.effects:
+            normal = normal + effect.extra_load(e, n) if effect.extra_load else normal
+            if effect.wheel_angle:
+                skew = effect.wheel_angle(e, n)
+                c, s = c * ca.cos(skew) - s * ca.sin(skew), s * ca.cos(skew) + c * ca.sin(skew)
+        v_t, v_n = c * v.x + s * v.y, c * v.y - s * v.x
+        along, across = FRICTION_LAWS[p.structure.friction_law](v_t, v_n, p["friction_speed_m_s"])
+        f_t = -p["friction_tangential"] * normal * along
+        f_n = -p["friction_normal"] * normal * across
+        for effect, e in p.effects:
+            f_t = f_t * effect.rolling_factor(e, v_t) if effect.rolling_factor else f_t
+            f_n = f_n * effect.skidding_factor(e, v_n) if effect.skidding_factor else f_n
+        for effect, e in p.effects:
+            f_t = f_t + effect.rolling_force(e, v_t) if effect.rolling_force else f_t
+        friction_power = -(ca.dot(f_t, v_t) + ca.dot(f_n, v_n))
+        x, y = c * f_t - s * f_n, s * f_t + c * f_n
+        for fx, fy in self._link_forces(pose, v):
+            x, y = x + fx, y + fy
+        return Forces(x, y, friction_power, ca.dot(x, v.x) + ca.dot(y, v.y))
+
+    def _link_forces(self, pose: ca.SX, v: Chain) -> list[tuple[ca.SX, ca.SX]]:
+        p = self.parameters
+        c, s = ca.cos(pose[2]), ca.sin(pose[2])
+        state = LinkState(
+            room_x=pose[0] + c * self.chain.x - s * self.chain.y,
+            room_y=pose[1] + s * self.chain.x + c * self.chain.y,
+            heading=pose[2],
+            v_x=v.x,
+            v_y=v.y,
+            mass=self.mass,
+            gravity=p["gravity_m_s2"],
+            friction_speed=p["friction_speed_m_s"],
+        )
+        return [effect.link_force(e, state) for effect, e in p.effects if effect.link_force]
+
+    def pose_rate(self, pose: ca.SX, velocity: ca.SX) -> ca.SX:
+        """Return (x', y', psi') for the body velocity (u_x, u_y, yaw momentum)."""
+        c, s = ca.cos(pose[2]), ca.sin(pose[2])
+        u_x, u_y = velocity[0], velocity[1]
+        return ca.vertcat(c * u_x - s * u_y, s * u_x + c * u_y, self.yaw_rate(velocity[2]))
+
+    def velocity_rate(self, pose: ca.SX, velocity: ca.SX) -> tuple[ca.SX, ca.SX]:
+        """Return the rate of (u_x, u_y, yaw momentum) and the friction power.
+
+        Translation is N m p'' = sum f, the paper's (8) and (10), seen from the turning frame.
+        """
+        u_x, u_y = velocity[0], velocity[1]
+        yaw_rate = self.yaw_rate(velocity[2])
+        f = self.forces(pose, u_x, u_y, yaw_rate)
+        per_mass = 1 / self.total_mass()
+        rate = ca.vertcat(
+            ca.sum1(f.x) * per_mass + yaw_rate * u_y,
+            ca.sum1(f.y) * per_mass - yaw_rate * u_x,
+            self.yaw_momentum_rate(f, yaw_rate),
+        )
+        return rate, f.friction_power

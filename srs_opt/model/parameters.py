@@ -1,0 +1,157 @@
+"""The models' parameters as symbols, and how a robot and a gait fill them with numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from srs_opt.errors import UnsupportedEffectError
+from srs_opt.model.effects import all_effects
+from srs_opt.model.effects.effect import Effect
+from srs_opt.robot import Robot
+
+ROBOT_PARAMETERS = (
+    "segment_length_m",
+    "gap_length_m",
+    "link_mass_kg",
+    "link_inertia_kg_m2",
+    "friction_tangential",
+    "friction_normal",
+    "friction_speed_m_s",
+    "gravity_m_s2",
+    "curvature_per_pressure_1_m_kpa",
+    "tau1_s",
+    "tau2_s",
+)
+GAIT_PARAMETERS = ("pressure_kpa", "frequency_hz")
+
+
+@dataclass(frozen=True)
+class Structure:
+    """What fixes the equations: number of links, laws and effects; all else is a parameter.
+
+    Two robots with the same structure share one compiled model. `effects` lists effect
+    names, sorted, once per occurrence.
+    """
+
+    model: str
+    links: int
+    friction_law: str
+    effects: tuple[str, ...] = ()
+
+    @staticmethod
+    def of(robot: Robot, model: str = "complex", *, room: bool = True) -> Structure:
+        """Return the structure of `robot` without effects of zero size.
+
+        ``room=False`` leaves out effects that know the room.
+        """
+        names = tuple(str(e["name"]) for e in dynamic_effects(robot, room=room) if _present(e))
+        return Structure(model, robot.links, robot.friction_law, names)
+
+    @property
+    def segments(self) -> int:
+        """Number of bending segments."""
+        return self.links - 1
+
+
+def dynamic_effects(robot: Robot, *, room: bool = True) -> list[Mapping[str, Any]]:
+    """Return the robot's effects that enter the equations of motion, in a canonical order.
+
+    Delays act on the valve schedule and measurement effects on the camera; neither is here.
+    """
+    chosen = []
+    for spec in robot.effects:
+        effect = all_effects()[spec["name"]]
+        in_equations = effect.kind != "measurement" and effect.delay is None
+        if in_equations and (room or not effect.knows_the_room):
+            chosen.append(spec)
+    order = list(all_effects())
+    return sorted(
+        chosen, key=lambda s: (order.index(s["name"]), *[float(v) for k, v in s.items() if k != "name"])
+    )
+
+
+def _present(spec: Mapping[str, Any]) -> bool:
+    return bool(spec[all_effects()[spec["name"]].size.name] != 0)
+
+
+def room_effects(robot: Robot) -> list[str]:
+    """Return the names of the robot's effects that break the periodic orbit."""
+    return [str(s["name"]) for s in robot.effects if all_effects()[s["name"]].knows_the_room and _present(s)]
+
+
+def valve_delay_s(robot: Robot) -> float:
+    """Return the total delay between command and valve, s (the robot's own and that of its effects)."""
+    delay = robot.valve_delay_s
+    for spec in robot.effects:
+        hook = all_effects()[spec["name"]].delay
+        if hook is not None:
+            delay += float(hook(spec))
+    return delay
+
+
+class Parameters:
+    """Symbols of one structure, in a fixed order, with their packing from robots.
+
+    Attributes
+    ----------
+    names : tuple of str
+        ``friction_normal``, ..., ``pressure_kpa``, then ``0.tether_drag.force_n`` per effect; place
+        parameters take one entry per segment or link (``1.segment_bias.segment[2]``).
+    vector : SX (n, 1)
+    """
+
+    def __init__(self, structure: Structure) -> None:
+        self.structure = structure
+        symbols: dict[str, ca.SX] = {n: ca.SX.sym(n) for n in (*ROBOT_PARAMETERS, *GAIT_PARAMETERS)}
+        self.effects: list[tuple[Effect, dict[str, ca.SX]]] = []
+        for index, name in enumerate(structure.effects):
+            effect = all_effects().get(name)
+            if effect is None:
+                raise UnsupportedEffectError(f"effect '{name}' is not part of any model")
+            own: dict[str, ca.SX] = {}
+            for parameter in effect.parameters:
+                key = f"{index}.{name}.{parameter.name}"
+                size = {"link": structure.links, "segment": structure.segments}.get(parameter.place or "", 1)
+                own[parameter.name] = symbols[key] = ca.SX.sym(key, size)
+            self.effects.append((effect, own))
+        self._symbols = symbols
+        self.vector = ca.vertcat(*symbols.values())
+
+    def __getitem__(self, name: str) -> ca.SX:
+        return self._symbols[name]
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Name of every entry of the packed vector."""
+        names: list[str] = []
+        for key, symbol in self._symbols.items():
+            n = symbol.numel()
+            names += [key] if n == 1 else [f"{key}[{i + 1}]" for i in range(n)]
+        return tuple(names)
+
+    def pack(self, robot: Robot, pressure_kpa: float, frequency_hz: float) -> np.ndarray:
+        """Return the numbers for `robot` under one pressure and frequency, shape (n,)."""
+        values: list[float] = [float(getattr(robot, name)) for name in ROBOT_PARAMETERS]
+        values += [pressure_kpa, frequency_hz]
+        specs = dynamic_effects(robot, room=True)
+        wanted = [s for s in specs if s["name"] in self.structure.effects]
+        if len(wanted) != len(self.structure.effects):
+            wanted = [s for s in wanted if _present(s)]
+        for (effect, own), spec in zip(self.effects, wanted, strict=True):
+            if spec["name"] != effect.name:
+                raise ValueError(f"robot's effects {wanted} do not match the structure {self.structure}")
+            for parameter in effect.parameters:
+                value = spec[parameter.name]
+                if parameter.place:
+                    weights = np.zeros(own[parameter.name].numel())
+                    weights[int(value) - 1] = 1.0
+                    values += weights.tolist()
+                else:
+                    values.append(float(value))
+        return np.array(values)
