@@ -1,0 +1,1 @@
+"""Switch-exact simulation: steps end at valve switches, curvature in closed form."""

@@ -1,0 +1,96 @@
+"""``python -m srs_opt.simulate``: run a gait on the dynamic model."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+
+from srs_opt.command import Answer, Parser, finite_float, make_parser, positive_float, run_command
+
+
+def build_parser() -> Parser:
+    """Return the command's options."""
+    parser = make_parser(
+        "python -m srs_opt.simulate",
+        "Run a gait from rest on the dynamic model; writes trajectory.csv and a picture.",
+        "python -m srs_opt.simulate --frequency 2 --pressure 55 --offset 0.4 --duration 20",
+    )
+    add = parser.add_argument
+    add("--frequency", type=positive_float, default=2.0, metavar="HZ", help="cycles per second (default 2)")
+    add("--pressure", type=positive_float, default=55.0, metavar="KPA", help="regulator, kPa (default 55)")
+    add(
+        "--offset",
+        type=finite_float,
+        default=0.0,
+        metavar="PHI",
+        help="steering offset, -1..1, + left (default 0)",
+    )
+    add(
+        "--phase-lag",
+        type=finite_float,
+        metavar="RAD",
+        help="delay between segments, rad (default 2 pi/(N-1))",
+    )
+    add("--gait", metavar="FILE", help="gait of gait_opt (JSON), TABLE.json:NAME, or a schedule CSV, instead")
+    add("--duration", type=positive_float, default=20.0, metavar="S", help="simulated time, s (default 20)")
+    add(
+        "--heading",
+        type=finite_float,
+        default=0.0,
+        metavar="RAD",
+        help="heading at the start, rad (default 0)",
+    )
+    return parser
+
+
+def run(options: argparse.Namespace) -> Answer:
+    """Simulate and write the files."""
+    from srs_opt.gait import Wave
+    from srs_opt.gait_file import load_gait
+    from srs_opt.robot import load_robot
+    from srs_opt.simulate.export import write_trajectory
+    from srs_opt.simulate.figures import draw_simulation
+    from srs_opt.simulate.run import simulate
+
+    robot = load_robot(options.robot)
+    if options.gait:
+        gait = load_gait(options.gait, options.pressure)
+    else:
+        lag = 2 * math.pi / robot.segments if options.phase_lag is None else options.phase_lag
+        gait = Wave.uniform(robot.segments, options.frequency, options.pressure, lag, options.offset).gait()
+    result = simulate(robot, gait, options.duration, options.model, options.heading)
+    files = [write_trajectory(result.trajectory, options.out / "trajectory.csv")]
+    files += draw_simulation(robot, options.model, result, options.out / "trajectory")
+    record = {
+        "speed_m_s": result.speed_m_s,
+        "turn_rate_rad_s": result.turn_rate_rad_s,
+        "radius_m": result.radius_m,
+        "error_estimate": result.error_estimate,
+        "wall_s": result.wall_s,
+        "compile_s": result.compile_s,
+    }
+    return Answer(record, _words(record), files=tuple(files))
+
+
+def _words(record: dict[str, float | None]) -> str:
+    speed, turn, radius = record["speed_m_s"], record["turn_rate_rad_s"], record["radius_m"]
+    if speed is None or turn is None:
+        return "simulated; fewer than two whole cycles, so no mean speed"
+    way = (
+        "straight"
+        if radius is None
+        else f"radius {abs(radius):.3f} m to the {'left' if radius > 0 else 'right'}"
+    )
+    error = record["error_estimate"]
+    trust = f" (numerical error about {error:.1e})" if error is not None else ""
+    return f"speed {speed:.4f} m/s, turn rate {turn:+.4f} rad/s, {way}{trust}"
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the command."""
+    return run_command(build_parser(), run, argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

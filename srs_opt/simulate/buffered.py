@@ -1,0 +1,43 @@
+"""A CasADi function called over and over without copying: half the cost of a block is the call itself."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import casadi as ca
+import numpy as np
+
+
+class Buffered:
+    """A function with its own argument and result arrays.
+
+    Arrays are (columns, rows): a CasADi matrix of shape (rows, columns) read in C order. Write into
+    ``arguments[i]``, call :meth:`evaluate`, read ``results[i]`` (copy what must survive the next call).
+    """
+
+    def __init__(self, function: ca.Function) -> None:
+        self._function = _dense(function)
+        self._buffer, self.evaluate = self._function.buffer()
+        f = self._function
+        self.arguments = [np.zeros((f.size2_in(i), f.size1_in(i))) for i in range(f.n_in())]
+        self.results = [np.zeros((f.size2_out(i), f.size1_out(i))) for i in range(f.n_out())]
+        for i, array in enumerate(self.arguments):
+            self._buffer.set_arg(i, memoryview(array))  # type: ignore[arg-type]
+        for i, array in enumerate(self.results):
+            self._buffer.set_res(i, memoryview(array))  # type: ignore[arg-type]
+
+
+def _dense(function: ca.Function) -> ca.Function:
+    """Return the function with dense arguments and results, which its buffers then are."""
+    dense_in = all(function.nnz_in(i) == function.numel_in(i) for i in range(function.n_in()))
+    dense_out = all(function.nnz_out(i) == function.numel_out(i) for i in range(function.n_out()))
+    if dense_in and dense_out:
+        return function
+    inputs = [ca.MX.sym(f"i{i}", *function.size_in(i)) for i in range(function.n_in())]
+    return ca.Function("dense", inputs, [ca.densify(output) for output in function.call(inputs)])
+
+
+@lru_cache(maxsize=64)
+def buffered(function: ca.Function) -> Buffered:
+    """Return the (one) buffered form of a function."""
+    return Buffered(function)

@@ -1,0 +1,152 @@
+"""Generated C, compiled once and cached on disk; without a compiler the interpreter does the same work.
+
+The cache key holds everything the machine code depends on: the package's own equations (source hash),
+the structure, casadi's version, the compiler and its version, the flags. Libraries are moved into place
+atomically, so two processes may build the same one at once. A library ends with its own hash (loaders
+ignore what follows the sections): one that is damaged is never loaded, which could kill the process, but
+built again.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import platform
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from functools import lru_cache
+from pathlib import Path
+
+import casadi as ca
+
+from srs_opt.model.effects.own import own_effects
+
+FLAGS = ("-O1", "-fPIC", "-shared", "-fno-math-errno")
+
+_SEAL = 32  # bytes of a SHA-256
+
+compile_seconds = 0.0  # spent in this process, for the commands' reports
+
+
+def cache_folder() -> Path:
+    """Return the folder of compiled models (``SRS_OPT_CACHE`` overrides the platform's own place)."""
+    import platformdirs
+
+    return Path(os.environ.get("SRS_OPT_CACHE") or platformdirs.user_cache_dir("srs-opt", appauthor=False))
+
+
+@lru_cache(maxsize=1)
+def compiler() -> tuple[str, str] | None:
+    """Return the C compiler and its version line, or None (``SRS_OPT_CC=none`` switches it off)."""
+    wanted = os.environ.get("SRS_OPT_CC") or os.environ.get("CC") or "cc gcc clang"
+    for name in wanted.split():
+        path = shutil.which(name)
+        if path is None:
+            continue
+        try:
+            done = subprocess.run([path, "--version"], capture_output=True, text=True, timeout=20, check=True)
+        except (OSError, subprocess.SubprocessError):
+            continue
+        return path, done.stdout.splitlines()[0] if done.stdout else path
+    print("note: no C compiler found; models run interpreted, about ten times slower", file=sys.stderr)
+    return None
+
+
+@lru_cache(maxsize=1)
+def _source_digest() -> str:
+    """Return a hash of the package's equations: what the generated code is made from."""
+    digest = hashlib.sha256()
+    package = Path(__file__).resolve().parent.parent
+    for folder in ("model", "simulate"):
+        for file in sorted(p for p in (package / folder).rglob("*.*") if p.suffix in (".py", ".in")):
+            digest.update(file.read_bytes())
+    return digest.hexdigest()
+
+
+def compiled(key: str, build: Callable[[], ca.Function], flags: tuple[str, ...] = FLAGS) -> ca.Function:
+    """Return the function that `build` makes, as compiled code where a compiler is there.
+
+    Parameters
+    ----------
+    key : str
+        Says, with the package's sources, what `build` makes; equal keys must mean equal functions.
+    build : callable
+        Makes the casadi.Function; called only when the cache does not hold it.
+    flags : tuple of str
+        For the compiler.
+    """
+    found = library(key, build, _casadi_source, flags)
+    if found is not None:
+        with contextlib.suppress(RuntimeError):  # made for another machine
+            return ca.external(found.stem, str(found))
+    return build()
+
+
+def library(
+    key: str,
+    build: Callable[[], ca.Function],
+    source: Callable[[ca.Function, str], str],
+    flags: tuple[str, ...],
+) -> Path | None:
+    """Return the shared library of ``source(build(), name)``, built if need be; its name is the file's stem.
+
+    None where there is no compiler or it fails (said once, on stderr).
+    """
+    global compile_seconds
+    cc = compiler()
+    if cc is None:
+        return None
+    parts = [key, _source_digest(), ca.CasadiMeta.version(), platform.machine(), *cc, *flags]
+    if any(name in key for name in own_effects()):  # their equations are not part of the package's sources
+        parts.append(build().serialize())
+    path = cache_folder() / f"srs_{hashlib.sha256(chr(0).join(parts).encode()).hexdigest()[:32]}.so"
+    if path.exists() and _whole(path):
+        return path
+    started = time.perf_counter()
+    try:
+        _compile(source(build(), path.stem), path, [cc[0], *flags])
+    except (OSError, subprocess.SubprocessError) as error:
+        print(f"note: compiling a model failed ({error}); it runs interpreted, slower", file=sys.stderr)
+        return None
+    finally:
+        compile_seconds += time.perf_counter() - started
+    return path
+
+
+def _whole(path: Path) -> bool:
+    """Whether a library is what was once written; a damaged one is removed."""
+    try:
+        content = path.read_bytes()
+        if hashlib.sha256(content[:-_SEAL]).digest() == content[-_SEAL:]:
+            return True
+    except OSError:  # unreadable: rebuild
+        pass
+    with contextlib.suppress(OSError):
+        path.unlink(missing_ok=True)
+    return False
+
+
+def _compile(source: str, path: Path, command: list[str]) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=path.parent, prefix=".building-") as folder:
+        file, target = Path(folder) / "model.c", Path(folder) / "model.so"
+        file.write_text(source, encoding="utf-8")
+        command = [*command, str(file), "-o", str(target), "-lm"]
+        subprocess.run(command, capture_output=True, text=True, check=True, timeout=900)
+        content = target.read_bytes()
+        target.write_bytes(content + hashlib.sha256(content).digest())
+        os.replace(target, path)
+
+
+def _casadi_source(function: ca.Function, name: str) -> str:
+    inputs = function.mx_in()
+    names_in = [function.name_in(i) for i in range(function.n_in())]
+    names_out = [function.name_out(i) for i in range(function.n_out())]
+    generator = ca.CodeGenerator(f"{name}.c")
+    generator.add(ca.Function(name, inputs, function.call(inputs), names_in, names_out))
+    return str(generator.dump())

@@ -1,0 +1,245 @@
+"""Integration of the model over a timeline, adaptive, every step ending at or before a valve switch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import casadi as ca
+import numpy as np
+
+from srs_opt.errors import NoAnswerError
+from srs_opt.model.parameters import Structure, valve_delay_s
+from srs_opt.model.registry import build
+from srs_opt.robot import Robot
+from srs_opt.simulate.compiled import compiled
+from srs_opt.simulate.kernel import Kernel
+from srs_opt.simulate.mesh import Mesh
+from srs_opt.simulate.rosenbrock import BODY_STATES, step_function
+from srs_opt.simulate.timeline import Timeline
+from srs_opt.simulate.together import Search, Stretch, alone
+
+BLOCK = 32  # steps per call of the compiled function
+_REFINEMENTS = 3
+STEP_S = 0.005  # first guess of the step
+LOOSE = 8.0  # a mesh is kept while no step errs by more than this many tolerances
+MANY = 32  # alike pieces integrated in one call
+TOLERANCE_M_S = 3e-5  # local error of the body speed per step: about 1e-4 of the distance travelled
+
+
+@lru_cache(maxsize=32)
+def block_function(structure: Structure) -> ca.Function:
+    """Return ``(x, valve (N-1, BLOCK), h (1, BLOCK), p) -> (states (nx, BLOCK), errors (1, BLOCK))``."""
+
+    def make() -> ca.Function:
+        step = step_function(structure)
+        repeated = step.mapaccum("repeated", BLOCK)
+        x, p = ca.MX.sym("x", step.size1_in(0)), ca.MX.sym("p", step.size1_in(3))
+        valve, h = ca.MX.sym("valve", structure.segments, BLOCK), ca.MX.sym("h", 1, BLOCK)
+        return ca.Function("block", [x, valve, h, p], repeated(x, valve, h, ca.repmat(p, 1, BLOCK)))
+
+    return compiled(f"block {BLOCK} {structure}", make)
+
+
+@lru_cache(maxsize=32)
+def step_kernel(structure: Structure) -> Kernel:
+    """Return the compiled :func:`step_function`."""
+    parameters, _, actuator = build(structure)
+    sizes = (BODY_STATES + actuator.states, structure.segments, parameters.vector.numel())
+    return Kernel(f"step {structure}", sizes, lambda: step_function(structure))
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """States at the integration's nodes.
+
+    Attributes
+    ----------
+    time_s : array (n,)
+    pose : array (n, 3)
+        Centre of mass x, y (m) and mean heading (rad, unwrapped).
+    velocity : array (n, 3)
+        Velocity of the centre of mass in the robot's frame (m/s) and yaw momentum (model's own).
+    work_j : array (n,)
+        Friction work since the start.
+    kappa, dkappa : array (n, N-1)
+        Curvatures (1/m) and their rates.
+    final : array
+        The whole last state, to go on from.
+    error_m_s : array (n-1,)
+        Estimated local error of the speed, per step.
+    """
+
+    time_s: np.ndarray
+    pose: np.ndarray
+    velocity: np.ndarray
+    work_j: np.ndarray
+    kappa: np.ndarray
+    dkappa: np.ndarray
+    final: np.ndarray
+    error_m_s: np.ndarray
+
+    def at(self, time_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return pose (m, 3) and curvature (m, N-1) at other times, by cubic interpolation."""
+        from scipy.interpolate import PchipInterpolator
+
+        pose = PchipInterpolator(self.time_s, self.pose, axis=0)(time_s)
+        kappa = PchipInterpolator(self.time_s, self.kappa, axis=0)(time_s)
+        return pose, kappa
+
+
+class Integrator:
+    """Runs one robot's model; holds the compiled step and nothing that changes."""
+
+    def __init__(self, robot: Robot, model: str = "complex", *, room: bool = True) -> None:
+        self.robot = robot
+        self.structure = Structure.of(robot, model, room=room)
+        self.parameters, self.mechanics, self.actuator = build(self.structure)
+        self.states = BODY_STATES + self.actuator.states
+        self.kernel = step_kernel(self.structure)
+        self._room = room
+
+    def pack(self, pressure_kpa: float, frequency_hz: float) -> np.ndarray:
+        """Return the model's parameter vector."""
+        return self.parameters.pack(self.robot, pressure_kpa, frequency_hz)
+
+    def rest(self, x_m: float = 0.0, y_m: float = 0.0, heading_rad: float = 0.0) -> np.ndarray:
+        """Return the state of the straight robot at rest, its centre of mass at (x, y)."""
+        state = np.zeros(self.states)
+        state[:3] = x_m, y_m, heading_rad
+        return state
+
+    def steps(
+        self, x: np.ndarray, mesh: Mesh, valve: np.ndarray, p: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Integrate over `mesh` with `valve` (N-1, phases): states (nx, n) after each step, errors (n,).
+
+        Raises
+        ------
+        NoAnswerError
+            If the state stops being finite.
+        """
+        return alone(self._steps(x, mesh, valve, p))
+
+    def run(self, timeline: Timeline, x: np.ndarray, tolerance: float = TOLERANCE_M_S) -> Trajectory:
+        """Integrate over a whole timeline from state `x` (the robot's valve delay is applied here).
+
+        Raises
+        ------
+        NoAnswerError
+            If the state stops being finite.
+        """
+        return alone(self.travel(timeline, x, tolerance))
+
+    def travel(
+        self, timeline: Timeline, x: np.ndarray, tolerance: float = TOLERANCE_M_S
+    ) -> Search[Trajectory]:
+        """Do what :meth:`run` does, as a search: see `together` for many at once."""
+        timeline = timeline.delayed(valve_delay_s(self.robot))
+        times, states, errors = [np.zeros(1)], [x[:, None]], []
+        start = 0.0
+        known: dict[bytes, Mesh] = {}
+        for piece, key, repeats in _runs_of_alike(_pieces(timeline)):
+            p = self.pack(float(piece.pressure_kpa[0]), float(piece.frequency_hz[0]))
+            mesh = known.get(key) or Mesh.uniform(piece.duration_s, STEP_S)
+            done = 1
+            while repeats:  # twice as many at a time while the mesh serves
+                many = min(repeats, 2 * done, MANY)
+                new, error, mesh, done = yield from self._alike(x, mesh, piece.valve, p, many, tolerance)
+                repeats -= done
+                x = new[:, -1]
+                times.append(start + np.cumsum(np.tile(mesh.h_s, done)))
+                start = float(times[-1][-1])
+                states.append(new)
+                errors.append(error)
+            known[key] = mesh
+        return _trajectory(
+            np.concatenate(times),
+            np.concatenate(states, axis=1),
+            np.concatenate(errors),
+            self.actuator.segments,
+        )
+
+    def _alike(
+        self, x: np.ndarray, mesh: Mesh, valve: np.ndarray, p: np.ndarray, many: int, tolerance: float
+    ) -> Search[tuple[np.ndarray, np.ndarray, Mesh, int]]:
+        """Integrate `many` alike pieces in one call, as far as the mesh is fine enough; else one, refining.
+
+        Returns states (nx, n), errors (n,), the mesh of each piece and how many pieces were done.
+        """
+        for _ in range(_REFINEMENTS):
+            repeated = mesh.repeated(many, valve.shape[1])
+            states, errors = yield from self._steps(x, repeated, np.tile(valve, many), p)
+            worst = errors.reshape(many, -1).max(axis=1)
+            good = int(np.argmax([*(worst > LOOSE * tolerance), True]))
+            if good:
+                kept = good * mesh.h_s.size
+                return states[:, :kept], errors[:kept], mesh, good
+            mesh, many = mesh.refined(errors[: mesh.h_s.size], tolerance), 1
+        states, errors = yield from self._steps(x, mesh, valve, p)
+        return states, errors, mesh, 1
+
+    def _steps(
+        self, x: np.ndarray, mesh: Mesh, valve: np.ndarray, p: np.ndarray
+    ) -> Search[tuple[np.ndarray, np.ndarray]]:
+        got = yield Stretch(self.kernel, x, mesh, valve, p)
+        if not np.isfinite(got.states[:, -1]).all():
+            bad = int(np.argmax(~np.isfinite(got.states).all(axis=0)))
+            raise NoAnswerError(
+                f"the simulated motion of robot '{self.robot.name}' stops being finite "
+                f"{mesh.h_s[:bad].sum():.3g} s into a cycle: check masses, time constants and effect sizes"
+            )
+        return got.states, got.error_m_s
+
+
+def _runs_of_alike(pieces: list[Timeline]) -> list[tuple[Timeline, bytes, int]]:
+    """Return pieces with a key that says what they are and how often they follow each other."""
+    runs: list[tuple[Timeline, bytes, int]] = []
+    for piece in pieces:
+        setting = np.array([piece.pressure_kpa[0], piece.frequency_hz[0]])
+        key = np.round(piece.duration_s, 9).tobytes() + piece.valve.tobytes() + setting.tobytes()
+        if runs and runs[-1][1] == key:
+            runs[-1] = (runs[-1][0], key, runs[-1][2] + 1)
+        else:
+            runs.append((piece, key, 1))
+    return runs
+
+
+def _pieces(timeline: Timeline, longest_phases: int = 40) -> list[Timeline]:
+    """Cut a timeline where pressure or frequency change, and at cycle ends, so that meshes can be reused."""
+    pieces = []
+    start, n = 0, timeline.duration_s.size
+    elapsed = 0.0
+    for k in range(1, n + 1):
+        elapsed += timeline.duration_s[k - 1]
+        changed = k < n and (
+            timeline.pressure_kpa[k] != timeline.pressure_kpa[start]
+            or timeline.frequency_hz[k] != timeline.frequency_hz[start]
+        )
+        full = elapsed >= 1 / timeline.frequency_hz[start] - 1e-9 or k - start >= longest_phases
+        if k == n or changed or full:
+            cut = slice(start, k)
+            pieces.append(
+                Timeline(
+                    timeline.duration_s[cut],
+                    timeline.valve[:, cut],
+                    timeline.pressure_kpa[cut],
+                    timeline.frequency_hz[cut],
+                )
+            )
+            start, elapsed = k, 0.0
+    return pieces
+
+
+def _trajectory(time_s: np.ndarray, states: np.ndarray, errors: np.ndarray, segments: int) -> Trajectory:
+    act = states[BODY_STATES:]
+    return Trajectory(
+        time_s=time_s,
+        pose=states[:3].T,
+        velocity=states[3:6].T,
+        work_j=states[6],
+        kappa=act[:segments].T,
+        dkappa=act[segments : 2 * segments].T,
+        final=states[:, -1],
+        error_m_s=errors,
+    )

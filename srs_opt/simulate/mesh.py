@@ -1,0 +1,68 @@
+"""Step sizes: a mesh inside phases of held valves, refined where the error estimate is large."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+ORDER = 4.0  # of the embedded error estimate's local error, h^4
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Integration steps of consecutive phases.
+
+    Attributes
+    ----------
+    h_s : array (n,)
+        Step sizes.
+    phase : int array (n,)
+        The phase that each step belongs to, ascending.
+    """
+
+    h_s: np.ndarray
+    phase: np.ndarray
+
+    @staticmethod
+    def uniform(durations: np.ndarray, step_s: float, least: int = 4) -> Mesh:
+        """Divide every phase into equal steps of at most `step_s`."""
+        counts = np.maximum(np.ceil(durations / step_s - 1e-9).astype(int), least)
+        return Mesh(np.repeat(durations / counts, counts), np.repeat(np.arange(durations.size), counts))
+
+    def halved(self) -> Mesh:
+        """Return the mesh with every step cut in two."""
+        return Mesh(np.repeat(self.h_s / 2, 2), np.repeat(self.phase, 2))
+
+    def repeated(self, times: int, phases: int) -> Mesh:
+        """Return the mesh of `times` alike stretches of `phases` phases each."""
+        phase = self.phase[None, :] + phases * np.arange(times)[:, None]
+        return Mesh(np.tile(self.h_s, times), phase.ravel())
+
+    def refined(self, error: np.ndarray, tolerance: float) -> Mesh:
+        """Return a mesh whose steps should all make the same error `tolerance`.
+
+        `error` (n,) is the estimate per step of this mesh; steps change by at most a factor 4.
+        """
+        density = np.clip((np.maximum(error, 1e-30) / tolerance) ** (1 / ORDER), 0.25, 4.0)
+        density = _smoothed(density)
+        phases, first = np.unique(self.phase, return_index=True)
+        totals = np.add.reduceat(density, first)
+        counts = np.maximum(np.ceil(totals).astype(int), 2)
+        # the running count of new steps, made whole at every phase's end
+        level = np.concatenate(
+            [[0.0], np.cumsum(density * np.repeat(counts / totals, np.diff([*first, error.size])))]
+        )
+        times = np.concatenate([[0.0], np.cumsum(self.h_s)])
+        nodes = np.interp(np.arange(counts.sum() + 1), level, times)
+        edges = np.concatenate([[0], np.cumsum(counts)])
+        nodes[edges] = times[[*first, error.size]]
+        return Mesh(np.diff(nodes), np.repeat(phases, counts))
+
+
+def _smoothed(density: np.ndarray) -> np.ndarray:
+    """Widen peaks by one step to either side: features move a little when steps change."""
+    wide = density.copy()
+    wide[1:] = np.maximum(wide[1:], 0.7 * density[:-1])
+    wide[:-1] = np.maximum(wide[:-1], 0.7 * density[1:])
+    return wide

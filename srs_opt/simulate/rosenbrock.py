@@ -1,0 +1,156 @@
+"""One integration step as a CasADi expression: RODAS, order 4(3), L-stable.
+
+The friction is stiff (its rate is about mu_n g / v_s = 2,800 1/s at v_s = 2 mm/s), the shape is
+known in closed form, and valves switch only between steps. A linearly implicit method whose
+matrix is 3 x 3 (the body's velocity; the pose is eliminated) fits: no iterations, so the step is
+one expression that can be mapped over a mesh, differentiated and compiled.
+
+Source: E. Hairer and G. Wanner, Solving Ordinary Differential Equations II, IV.7 and IV.10 (RODAS).
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import casadi as ca
+
+from srs_opt.model.actuator import Actuator, ActuatorState
+from srs_opt.model.mechanics import Mechanics
+from srs_opt.model.parameters import Structure
+from srs_opt.model.registry import build
+
+GAMMA = 0.25
+NODES = (0.0, 0.386, 0.21, 0.63, 1.0, 1.0)
+TIME_WEIGHTS = (0.25, -0.1043, 0.1035, -0.03620000000000023, 0.0, 0.0)
+STAGES = (
+    (),
+    (1.544,),
+    (0.9466785280815826, 0.2557011698983284),
+    (3.314825187068521, 2.896124015972201, 0.9986419139977817),
+    (1.221224509226641, 6.019134481288629, 12.53708332932087, -0.687886036105895),
+)
+COUPLING = (
+    (),
+    (-5.6688,),
+    (-2.430093356833875, -0.2063599157091915),
+    (-0.1073529058151375, -9.594562251023355, -20.47028614809616),
+    (7.496443313967647, -10.24680431464352, -33.99990352819905, 11.7089089320616),
+    (8.083246795921522, -7.981132988064893, -31.52159432874371, 16.31930543123136, -6.058818238834054),
+)
+
+POSE, VELOCITY, WORK = slice(0, 3), slice(3, 6), 6
+BODY_STATES = 7
+LEVER_M = 0.1  # turns an error in yaw rate into one in speed
+
+
+def state_size(structure: Structure) -> int:
+    """Return the length of a state: pose (3), body velocity (3), friction work, actuators."""
+    return BODY_STATES + build(structure)[2].states
+
+
+class _BodyField:
+    """Right-hand side of pose, velocity and friction work as functions that can be called per stage."""
+
+    def __init__(self, m: Mechanics) -> None:
+        pose, velocity = ca.SX.sym("pose", 3), ca.SX.sym("velocity", 3)
+        rate, power = m.velocity_rate(pose, velocity)
+        pose_rate = m.pose_rate(pose, velocity)
+        shape = [m.kappa, m.dkappa]
+        p = m.parameters.vector
+        body = ca.vertcat(pose_rate, rate, power)
+        ddkappa = ca.SX.sym("ddkappa", m.links - 1)
+        in_time = ca.jtimes(body, ca.vertcat(m.kappa, m.dkappa), ca.vertcat(m.dkappa, ddkappa))
+        self.value = ca.Function("body", [pose, velocity, *shape, p], [body])
+        self.slopes = ca.Function(
+            "slopes",
+            [pose, velocity, *shape, ddkappa, p],
+            [ca.jacobian(body, pose), ca.jacobian(body, velocity), in_time],
+        )
+
+
+def _inverse3(a: ca.SX) -> ca.SX:
+    """Return the inverse of a 3 x 3 matrix by cofactors."""
+    c = [[a[(i + 1) % 3, (j + 1) % 3] * a[(i + 2) % 3, (j + 2) % 3] for j in range(3)] for i in range(3)]
+    d = [[a[(i + 1) % 3, (j + 2) % 3] * a[(i + 2) % 3, (j + 1) % 3] for j in range(3)] for i in range(3)]
+    cofactor = ca.vertcat(*[ca.horzcat(*[c[i][j] - d[i][j] for j in range(3)]) for i in range(3)])
+    determinant = a[0, 0] * cofactor[0, 0] + a[0, 1] * cofactor[0, 1] + a[0, 2] * cofactor[0, 2]
+    return cofactor.T * (1 / determinant)
+
+
+class _StageSolver:
+    """Solves (I/gamma - h J) k = r for the body, h = 0 included; the pose block is eliminated exactly."""
+
+    def __init__(self, by_pose: ca.SX, by_velocity: ca.SX, h: ca.SX) -> None:
+        # pose' depends on the pose only through the heading, so its block is nilpotent
+        self.lift = GAMMA * (ca.SX.eye(3) + GAMMA * h * by_pose[POSE, :])
+        self.pose_by_velocity = h * by_velocity[POSE, :]
+        self.velocity_by_pose = h * by_pose[VELOCITY, :]
+        self.work_by_pose, self.work_by_velocity = h * by_pose[WORK, :], h * by_velocity[WORK, :]
+        matrix = ca.SX.eye(3) / GAMMA - h * by_velocity[VELOCITY, :]
+        matrix -= self.velocity_by_pose @ self.lift @ self.pose_by_velocity
+        self.inverse = _inverse3(ca.densify(matrix))
+
+    def __call__(self, r: ca.SX) -> ca.SX:
+        r_pose, r_velocity, r_work = r[POSE], r[VELOCITY], r[WORK]
+        k_velocity = self.inverse @ (r_velocity + self.velocity_by_pose @ self.lift @ r_pose)
+        k_pose = self.lift @ (r_pose + self.pose_by_velocity @ k_velocity)
+        k_work = GAMMA * (r_work + self.work_by_pose @ k_pose + self.work_by_velocity @ k_velocity)
+        return ca.vertcat(k_pose, k_velocity, k_work)
+
+
+@lru_cache(maxsize=32)
+def step_function(structure: Structure) -> ca.Function:
+    """Return ``step(x, valve, h, p) -> (x_next, error)``: one RODAS step with the valves held.
+
+    `x` is (state_size,), `valve` (N-1,) in [-1, 1], `h` in s (zero is allowed and does nothing), `p` as
+    packed by :class:`Parameters`. `error` is the embedded estimate of the local error of the body's
+    velocity, m/s.
+    """
+    parameters, mechanics, actuator = build(structure)
+    x = ca.SX.sym("x", BODY_STATES + actuator.states)
+    valve, h = ca.SX.sym("valve", structure.segments), ca.SX.sym("h")
+    body, act = x[:BODY_STATES], actuator.unstack(x[BODY_STATES:])
+    field = _BodyField(mechanics)
+    shapes = _stage_shapes(actuator, act, valve, h)
+    p = parameters.vector
+    rates = actuator.rates(act, valve)
+    by_pose, by_velocity, in_time = field.slopes(
+        body[POSE], body[VELOCITY], act.kappa, act.dkappa, rates.dkappa, p
+    )
+    solve = _StageSolver(by_pose, by_velocity, h)
+    k: list[ca.SX] = []
+    y = body
+    for i in range(6):
+        if i < 5:
+            y = body + sum((a * kj for a, kj in zip(STAGES[i], k)), ca.SX.zeros(BODY_STATES, 1))
+        else:
+            y = y + k[4]
+        shape = shapes[NODES[i]]
+        r = h * field.value(y[POSE], y[VELOCITY], shape.kappa, shape.dkappa, p)
+        r = r + h * h * TIME_WEIGHTS[i] * in_time
+        r = r + sum((c * kj for c, kj in zip(COUPLING[i], k)), ca.SX.zeros(BODY_STATES, 1))
+        k.append(solve(r))
+    last = shapes[1.0]
+    inertia = ca.substitute(mechanics.yaw_inertia(), mechanics.kappa, last.kappa)
+    shape_error = ca.SX(0)
+    if not actuator.linear:  # no closed form: two half steps are kept, one whole step tells their error
+        half = actuator.advance(actuator.advance(act, valve, h / 2), valve, h / 2)
+        bend = parameters["segment_length_m"] * (half.dkappa - last.dkappa)
+        shape_error, last = ca.sumsqr(LEVER_M * bend), half
+    spin_error = LEVER_M * k[5][5] / inertia
+    error = ca.sqrt(k[5][3] ** 2 + k[5][4] ** 2 + spin_error**2 + shape_error + 1e-30)
+    return ca.Function(
+        "step",
+        [x, valve, h, p],
+        [ca.vertcat(y + k[5], last.vector()), error],
+        ["x", "valve", "h", "p"],
+        ["x_next", "error"],
+        {"cse": True},
+    )
+
+
+def _stage_shapes(
+    actuator: Actuator, act: ActuatorState, valve: ca.SX, h: ca.SX
+) -> dict[float, ActuatorState]:
+    """Return the actuators' states at the stages' times (each from the start of the step)."""
+    return {c: actuator.advance(act, valve, c * h) if c else act for c in sorted(set(NODES))}

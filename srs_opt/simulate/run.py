@@ -1,0 +1,113 @@
+"""A whole simulated trial: a gait from rest, its steady motion, and how far to trust it."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from srs_opt.errors import InputError
+from srs_opt.gait import Gait
+from srs_opt.model.outline import centre_line_function
+from srs_opt.orbit.motion import CycleMotion, cycle_motion, rotate
+from srs_opt.robot import Robot
+from srs_opt.simulate import compiled
+from srs_opt.simulate.integrate import TOLERANCE_M_S, Integrator, Trajectory
+from srs_opt.simulate.timeline import Timeline
+
+LONGEST_S = 100_000.0
+_CHECKED_CYCLES = 4
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """A simulated trial.
+
+    Attributes
+    ----------
+    gait : Gait
+    trajectory : Trajectory
+    speed_m_s, turn_rate_rad_s : float or None
+        Means over the whole cycles of the second half; None when there are fewer than two cycles.
+    radius_m : float or None
+        Speed over turn rate, + left; None when straight.
+    error_estimate : float or None
+        Relative change of the distance per cycle when the tolerance is tightened sixteenfold.
+    wall_s, compile_s : float
+    """
+
+    gait: Gait
+    trajectory: Trajectory
+    speed_m_s: float | None
+    turn_rate_rad_s: float | None
+    radius_m: float | None
+    error_estimate: float | None
+    wall_s: float
+    compile_s: float
+
+
+def simulate(
+    robot: Robot, gait: Gait, duration_s: float, model: str = "complex", heading_rad: float = 0.0
+) -> Simulation:
+    """Run `gait` from the straight robot at rest for `duration_s`, every period integrated.
+
+    Raises
+    ------
+    InputError
+        If the duration is out of range or the gait does not fit the robot.
+    """
+    if not 0 < duration_s <= LONGEST_S:
+        raise InputError(f"duration must be above 0 and at most {LONGEST_S:g} s, found {duration_s:g}")
+    if gait.segments != robot.segments:
+        raise InputError(f"gait drives {gait.segments} segments, robot '{robot.name}' has {robot.segments}")
+    before = compiled.compile_seconds
+    run = Integrator(robot, model)
+    start = run.rest(heading_rad=heading_rad)
+    timeline = Timeline.of_gait(gait, duration_s)
+    started = time.perf_counter()
+    trajectory = run.run(timeline, start)
+    wall = time.perf_counter() - started
+    speed, turn_rate, radius = _second_half(run, trajectory, gait)
+    error = _error_estimate(run, start, gait, duration_s)
+    return Simulation(
+        gait, trajectory, speed, turn_rate, radius, error, wall, compiled.compile_seconds - before
+    )
+
+
+def _second_half(
+    run: Integrator, trajectory: Trajectory, gait: Gait
+) -> tuple[float | None, float | None, float | None]:
+    cycles = int(trajectory.time_s[-1] / gait.period_s + 1e-9)
+    if cycles < 2:
+        return None, None, None
+    motions = [motion_of_cycle(run, trajectory, gait, k) for k in range(cycles // 2, cycles)]
+    speed = float(np.mean([m.speed_m_s for m in motions]))
+    turn_rate = float(np.mean([m.turn_rate_rad_s for m in motions]))
+    straight = motions[-1].radius_m is None
+    return speed, turn_rate, None if straight or turn_rate == 0 else speed / turn_rate
+
+
+def motion_of_cycle(run: Integrator, trajectory: Trajectory, gait: Gait, cycle: int) -> CycleMotion:
+    """Return the motion over one whole cycle of a trajectory (cycle 0 starts at time 0)."""
+    times = trajectory.time_s
+    first = int(np.searchsorted(times, cycle * gait.period_s - 1e-9))
+    last = int(np.searchsorted(times, (cycle + 1) * gait.period_s - 1e-9))
+    pose, kappa = trajectory.pose[first : last + 1], trajectory.kappa[first : last + 1]
+    pose = pose - np.array([pose[0, 0], pose[0, 1], 0.0])
+    p = run.pack(gait.pressure_kpa, gait.frequency_hz)
+    x, y = (np.asarray(v) for v in centre_line_function(run.structure, len(pose))(kappa.T, p))
+    x, y = rotate(pose[:, 2], x, y)
+    elapsed = times[first : last + 1] - times[first]
+    return cycle_motion(elapsed, pose, x + pose[:, 0], y + pose[:, 1], run.robot.body_width_m)
+
+
+def _error_estimate(run: Integrator, start: np.ndarray, gait: Gait, duration_s: float) -> float | None:
+    """Return the relative change of the path's length when a stretch is integrated again, finer."""
+    stretch = Timeline.of_gait(gait, min(duration_s, _CHECKED_CYCLES * gait.period_s))
+    usual = run.run(stretch, start)
+    finer = run.run(stretch, start, TOLERANCE_M_S / 16)
+    distance = float(np.hypot(*np.diff(finer.pose[:, :2], axis=0).T).sum())
+    if distance < 1e-6:
+        return None
+    return float(np.hypot(*(usual.pose[-1, :2] - finer.pose[-1, :2]))) / distance
