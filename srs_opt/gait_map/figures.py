@@ -1,0 +1,70 @@
+"""Contour maps of speed and radius over frequency and pressure, like the paper's Figs. 8 and 9."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from srs_opt.figures import PAGE_IN, SEQUENTIAL, new_figure, save_figure, styled
+from srs_opt.gait_map.grid import GaitMap
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_MOST_PANELS = 5
+
+
+@styled
+def draw_maps(gaits: GaitMap, folder: Path) -> list[Path]:
+    """Draw a sheet per phase lag: speed above, radius below, a column per offset; return the files."""
+    written: list[Path] = []
+    lags = np.unique(gaits.column("phase_lag_rad"))
+    for lag in lags:
+        at_lag = gaits.rows[gaits.column("phase_lag_rad") == lag]
+        sheet = GaitMap(at_lag)
+        if min(np.unique(sheet.column(c)).size for c in ("frequency_hz", "pressure_kpa")) < 2:
+            continue
+        name = "map" if lags.size == 1 else f"map_lag{lag:.2f}"
+        written += _sheet(sheet, folder / name, lag)
+    return written
+
+
+def _sheet(gaits: GaitMap, stem: Path, lag: float) -> tuple[Path, Path]:
+    offsets = np.unique(gaits.column("offset"))
+    shown = offsets[np.linspace(0, offsets.size - 1, min(offsets.size, _MOST_PANELS)).round().astype(int)]
+    turning = bool(np.isfinite(gaits.column("radius_m")).any())
+    rows = 2 if turning else 1
+    figure, axes = new_figure(
+        rows,
+        shown.size,
+        width_in=min(PAGE_IN, 1.2 + 2.3 * shown.size),
+        height_in=0.5 + 2.0 * rows,
+        squeeze=False,
+    )
+    for column, offset in enumerate(shown):
+        part = GaitMap(gaits.rows[gaits.column("offset") == offset])
+        _contours(axes[0, column], part, np.abs(part.column("speed_m_s")), "speed (m/s)")
+        axes[0, column].set_title(f"offset {offset:g}, lag {lag:.2f} rad")
+        if turning:
+            radius = np.abs(part.column("radius_m"))
+            _contours(axes[1, column], part, radius, "radius (m)")
+    return save_figure(figure, stem)
+
+
+def _contours(axes: Axes, part: GaitMap, values: np.ndarray, label: str) -> None:
+    frequency, pressure = np.unique(part.column("frequency_hz")), np.unique(part.column("pressure_kpa"))
+    table = np.full((pressure.size, frequency.size), np.nan)
+    rows = np.searchsorted(pressure, part.column("pressure_kpa"))
+    table[rows, np.searchsorted(frequency, part.column("frequency_hz"))] = values
+    if not np.isfinite(table).any():
+        axes.text(0.5, 0.5, "straight", transform=axes.transAxes, ha="center")
+        axes.set_axis_off()
+        return
+    axes.set_xlabel("frequency (Hz)")
+    axes.set_ylabel("pressure (kPa)")
+    filled = axes.contourf(frequency, pressure, table, 12, cmap=SEQUENTIAL)
+    lines = axes.contour(frequency, pressure, table, 6, colors="white", linewidths=0.5)
+    axes.clabel(lines, fontsize=6)
+    axes.figure.colorbar(filled, ax=axes, label=label)

@@ -1,0 +1,145 @@
+"""The map: steady motion at every point of a grid of waves."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import IO
+
+import numpy as np
+
+from srs_opt.errors import InputError
+from srs_opt.files import read_text, write_with
+from srs_opt.gait import Wave
+from srs_opt.robot import Robot
+from srs_opt.sweep import Resume, sweep
+
+COLUMNS = (
+    "frequency_hz",
+    "pressure_kpa",
+    "offset",
+    "phase_lag_rad",
+    "speed_m_s",
+    "turn_rate_rad_s",
+    "radius_m",
+    "envelope_right_m",
+    "envelope_left_m",
+)
+Point = tuple[float, float, float, float]
+LARGEST_MAP = 1_000_000
+_CHUNK = 96
+
+
+@dataclass(frozen=True)
+class GaitMap:
+    """Steady motion over (frequency, pressure, offset, lag); one row per gait, columns as in COLUMNS.
+
+    `rows` is (n, 9); the radius is NaN where the robot runs straight.
+    """
+
+    rows: np.ndarray
+
+    def column(self, name: str) -> np.ndarray:
+        """Return one column, (n,)."""
+        return self.rows[:, COLUMNS.index(name)]
+
+
+def grid_points(
+    frequencies_hz: Sequence[float],
+    pressures_kpa: Sequence[float],
+    offsets: Sequence[float],
+    lags_rad: Sequence[float],
+) -> list[Point]:
+    """Return all combinations, the frequency running fastest (neighbours help each other's start)."""
+    points = [(f, p, o, g) for g in lags_rad for o in offsets for p in pressures_kpa for f in frequencies_hz]
+    if len(points) > LARGEST_MAP:
+        raise InputError(
+            f"map of {len(points)} gaits is too large (limit {LARGEST_MAP}); ask for fewer steps"
+        )
+    return points
+
+
+def map_points(robot: Robot, model: str, points: Sequence[Point]) -> list[tuple[float, ...]]:
+    """Return a row of COLUMNS per point; a gait without a steady state gives NaN."""
+    from srs_opt.orbit.steady import Orbit, steady_gaits
+
+    gaits = [Wave.uniform(robot.segments, f, p, lag, offset).gait() for f, p, offset, lag in points]
+    rows: list[tuple[float, ...]] = []
+    for point, orbit in zip(points, steady_gaits(robot, gaits, model)):
+        if isinstance(orbit, Orbit):
+            radius = np.nan if orbit.radius_m is None else orbit.radius_m
+            rows.append((*point, orbit.speed_m_s, orbit.turn_rate_rad_s, radius, *orbit.envelope_m))
+        else:
+            rows.append((*point, *[np.nan] * 5))
+    return rows
+
+
+def gait_map(
+    robot: Robot,
+    model: str,
+    points: Sequence[Point],
+    *,
+    jobs: int = 1,
+    cluster: str | None = None,
+    quiet: bool = True,
+    resume: Path | None = None,
+) -> GaitMap:
+    """Return the map over `points` (frequency Hz, pressure kPa, offset, lag rad).
+
+    With the folder `resume`, gaits found there are not computed again; it is left for the caller to remove.
+
+    Raises
+    ------
+    InputError
+        For offsets that leave a valve for ever on or off, or waves that are not valid.
+    """
+    for point in points:
+        Wave.uniform(robot.segments, point[0], point[1], point[3], point[2])
+    work = partial(map_points, robot, model)
+    kept = None if resume is None else Resume(resume, f"gait map {robot} {model}")
+    rows = sweep(
+        work, points, chunk=_CHUNK, jobs=jobs, cluster=cluster, what="gaits", quiet=quiet, resume=kept
+    )
+    table = np.empty((len(points), len(COLUMNS)))
+    for k, row in enumerate(rows):
+        table[k] = row
+    return GaitMap(table)
+
+
+def save_map(gaits: GaitMap, path: Path | str) -> Path:
+    """Write map.csv; the radius is empty where the robot runs straight."""
+
+    def fill(stream: IO[str]) -> None:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(COLUMNS)
+        writer.writerows([["" if np.isnan(v) else f"{v:.8g}" for v in row] for row in gaits.rows])
+
+    return write_with(path, fill)
+
+
+def load_map(path: Path | str) -> GaitMap:
+    """Read a map.csv.
+
+    Raises
+    ------
+    InputError
+        Naming file and line of the first row that does not fit.
+    """
+    lines = read_text(path, "a gait map (CSV)").splitlines()
+    if not lines or lines[0].split(",") != list(COLUMNS):
+        raise InputError(f"{path}:1: expected the columns {','.join(COLUMNS)}")
+    rows = []
+    for number, line in enumerate(lines[1:], start=2):
+        try:
+            values = [float(v) if v else np.nan for v in line.split(",")]
+        except ValueError as error:
+            raise InputError(f"{path}:{number}: expected numbers, found '{line[:60]}'") from error
+        if len(values) != len(COLUMNS):
+            raise InputError(f"{path}:{number}: expected {len(COLUMNS)} values, found {len(values)}")
+        rows.append(values)
+    if not rows:
+        raise InputError(f"{path}: the map is empty")
+    return GaitMap(np.array(rows))

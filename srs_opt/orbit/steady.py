@@ -1,0 +1,230 @@
+"""A gait's steady state in one call: orbit, motion, envelope, stability, friction work."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache, partial
+
+import numpy as np
+
+from srs_opt.errors import InputError, NoAnswerError
+from srs_opt.gait import Gait
+from srs_opt.model.outline import centre_line_function
+from srs_opt.model.parameters import Structure
+from srs_opt.orbit.motion import CycleMotion, cycle_motion, rotate
+from srs_opt.orbit.solve import PeriodicSolution, search_orbit
+from srs_opt.robot import Robot
+from srs_opt.simulate.buffered import Buffered
+from srs_opt.simulate.compiled import compiled
+from srs_opt.simulate.integrate import TOLERANCE_M_S, Integrator
+from srs_opt.simulate.rosenbrock import BODY_STATES, VELOCITY, WORK
+from srs_opt.simulate.together import Search, alone, together
+from srs_opt.sweep import sweep
+
+CHAINS, CHAIN = 8, 12  # gaits searched side by side, and one after the other
+SAMPLES = 48  # body shapes per cycle for the envelope
+
+
+@dataclass(frozen=True)
+class Orbit:
+    """The relative periodic orbit of a gait.
+
+    Attributes
+    ----------
+    gait : Gait
+    motion : CycleMotion
+        Speed, turn rate, radius, envelope.
+    work_j : float
+        Friction work per cycle.
+    velocity : array (3,)
+        Body velocity (u_x, u_y, yaw momentum) at time 0; a start for neighbouring gaits.
+    multipliers : complex array (3,)
+        Floquet multipliers of the body velocity (pose removed), largest first.
+    shape_multiplier : float
+        Largest Floquet multiplier of the actuators, exp(-period / max tau).
+    time_s, pose, kappa : arrays (n,), (n, 3), (n, N-1)
+        One cycle from time 0 to the period, starting at pose 0.
+    solution : PeriodicSolution
+    """
+
+    gait: Gait
+    motion: CycleMotion
+    work_j: float
+    velocity: np.ndarray
+    multipliers: np.ndarray
+    shape_multiplier: float
+    time_s: np.ndarray
+    pose: np.ndarray
+    kappa: np.ndarray
+    solution: PeriodicSolution
+
+    @property
+    def speed_m_s(self) -> float:
+        """Mean speed along the path; negative backwards."""
+        return self.motion.speed_m_s
+
+    @property
+    def turn_rate_rad_s(self) -> float:
+        """Mean turn rate, + left."""
+        return self.motion.turn_rate_rad_s
+
+    @property
+    def radius_m(self) -> float | None:
+        """Radius of the mean path, + left; None when straight."""
+        return self.motion.radius_m
+
+    @property
+    def envelope_m(self) -> tuple[float, float]:
+        """Reach (right, left) of the body about the mean path, m."""
+        return self.motion.envelope_m
+
+    @property
+    def largest_multiplier(self) -> float:
+        """Largest modulus of all Floquet multipliers (shape and body velocity); below 1: stable."""
+        return max(float(abs(self.multipliers[0])), self.shape_multiplier)
+
+
+@lru_cache(maxsize=64)
+def integrator(robot: Robot, model: str = "complex") -> Integrator:
+    """Return the integrator of a robot without effects that know the room (they have no steady gait)."""
+    return Integrator(robot, model, room=False)
+
+
+def steady_gait(
+    robot: Robot,
+    gait: Gait,
+    model: str = "complex",
+    *,
+    tolerance: float = TOLERANCE_M_S,
+    guess: np.ndarray | None = None,
+) -> Orbit:
+    """Return the steady state of `gait`.
+
+    Parameters
+    ----------
+    robot, gait, model
+        The gait must drive every segment of the robot.
+    tolerance : float
+        Local error of the integration, m/s per step.
+    guess : array (3,), optional
+        Body velocity at time 0 of a neighbouring gait.
+
+    Raises
+    ------
+    InputError
+        If gait and robot do not belong together.
+    NoAnswerError
+        If no steady state is found.
+    """
+    run = integrator(robot, model)
+    return alone(_search(run, gait, tolerance, guess))
+
+
+def steady_gaits(
+    robot: Robot,
+    gaits: Sequence[Gait],
+    model: str = "complex",
+    *,
+    tolerance: float = TOLERANCE_M_S,
+    jobs: int = 1,
+) -> list[Orbit | NoAnswerError]:
+    """Return the steady states of many gaits, several at a time in each call of the compiled code.
+
+    Gaits that follow each other in the list should be alike: every hundred or so are cut into ``CHAINS``
+    parts, and in each part a gait's orbit is the guess for the next. `jobs` processes share the work; the
+    results are the same. For a gait without a steady state the error says why.
+
+    Raises
+    ------
+    InputError
+        If a gait and the robot do not belong together.
+    """
+    for gait in gaits:
+        _check_segments(robot, gait)
+    work = partial(_side_by_side, robot, model, tolerance)
+    return list(sweep(work, gaits, chunk=CHAINS * CHAIN, jobs=jobs))
+
+
+def _side_by_side(
+    robot: Robot, model: str, tolerance: float, gaits: Sequence[Gait]
+) -> list[Orbit | NoAnswerError]:
+    run = integrator(robot, model)
+    parts = np.array_split(np.arange(len(gaits)), min(CHAINS, max(len(gaits), 1)))
+    chains = [_chain(run, [gaits[i] for i in part], tolerance) for part in parts]
+    found: list[Orbit | NoAnswerError] = []
+    for chain in together(chains):
+        if isinstance(chain, NoAnswerError):  # a chain answers for each of its gaits
+            raise chain
+        found += chain
+    return found
+
+
+def _chain(run: Integrator, gaits: Sequence[Gait], tolerance: float) -> Search[list[Orbit | NoAnswerError]]:
+    found: list[Orbit | NoAnswerError] = []
+    guess = None
+    for gait in gaits:
+        try:
+            orbit = yield from _search(run, gait, tolerance, guess)
+        except NoAnswerError as error:
+            found.append(error)
+            guess = None
+        else:
+            found.append(orbit)
+            guess = orbit.velocity
+    return found
+
+
+def _check_segments(robot: Robot, gait: Gait) -> None:
+    if gait.segments != robot.segments:
+        raise InputError(f"gait drives {gait.segments} segments, robot '{robot.name}' has {robot.segments}")
+
+
+def _search(run: Integrator, gait: Gait, tolerance: float, guess: np.ndarray | None) -> Search[Orbit]:
+    robot = run.robot
+    _check_segments(robot, gait)
+    solution = yield from search_orbit(run, gait, tolerance, guess)
+    time_s = np.concatenate([[0.0], np.cumsum(solution.mesh.h_s)])
+    states = np.concatenate([solution.start[:, None], solution.states], axis=1)
+    pose, kappa = states[:3].T, states[BODY_STATES : BODY_STATES + robot.segments].T
+    # the delay of the valves shifts the whole cycle in time and changes nothing else
+    motion = cycle_motion(*body_over_cycle(run, time_s, pose, kappa, gait), robot.body_width_m)
+    multipliers = np.linalg.eigvals(solution.monodromy)
+    return Orbit(
+        gait=gait,
+        motion=motion,
+        work_j=float(solution.states[WORK, -1]),
+        velocity=solution.start[VELOCITY].copy(),
+        multipliers=multipliers[np.argsort(-abs(multipliers))],
+        shape_multiplier=float(np.exp(-gait.period_s / max(robot.tau1_s, robot.tau2_s))),
+        time_s=time_s,
+        pose=pose,
+        kappa=kappa,
+        solution=solution,
+    )
+
+
+def body_over_cycle(
+    run: Integrator,
+    time_s: np.ndarray,
+    pose: np.ndarray,
+    kappa: np.ndarray,
+    gait: Gait,
+    samples: int = SAMPLES,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return times (samples,), poses (samples, 3) and centre lines x, y (points, samples) in the room."""
+    at = np.linspace(0.0, time_s[-1], samples)
+    poses = np.stack([np.interp(at, time_s, column) for column in pose.T], axis=1)
+    kappas = np.stack([np.interp(at, time_s, column) for column in kappa.T])
+    line = _centre_lines(run.structure, samples)
+    line.arguments[0][:], line.arguments[1][0] = kappas.T, run.pack(gait.pressure_kpa, gait.frequency_hz)
+    line.evaluate()
+    x, y = (points.T for points in line.results)
+    room_x, room_y = rotate(poses[:, 2], x, y)
+    return at, poses, room_x + poses[:, 0], room_y + poses[:, 1]
+
+
+@lru_cache(maxsize=32)
+def _centre_lines(structure: Structure, samples: int) -> Buffered:
+    key = f"centre lines {samples} {structure}"
+    return Buffered(compiled(key, lambda: centre_line_function(structure, samples)))
