@@ -1,0 +1,1 @@
+"""Optimal periodic valve timing: collocation, rounding, switch times, certificate, gait tables."""

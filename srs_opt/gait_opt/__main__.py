@@ -1,0 +1,206 @@
+"""``python -m srs_opt.gait_opt``: optimal gaits for on/off valves, with a certificate; gait tables."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from srs_opt.command import (
+    Answer,
+    Parser,
+    finite_float,
+    make_parser,
+    positive_float,
+    positive_int,
+    run_command,
+    say,
+)
+
+if TYPE_CHECKING:
+    from srs_opt.gait_opt.collocation.problem import CycleProblem
+    from srs_opt.gait_opt.goal import Limits
+    from srs_opt.robot import Robot
+
+
+def build_parser() -> Parser:
+    """Return the command's options."""
+    parser = make_parser(
+        "python -m srs_opt.gait_opt",
+        "Find the best periodic valve timing by direct collocation; certify it by switch-exact simulation.",
+        "python -m srs_opt.gait_opt --objective turn --radius 0.3 --pressure 41 55",
+    )
+    goal = parser.add_argument_group("what is wanted")
+    goal.add_argument(
+        "--objective", choices=("speed", "transport", "turn", "slim"), default="speed",
+        help="fastest, least energy per weight and distance, best turn, slimmest swept band (default speed)",
+    )  # fmt: skip
+    goal.add_argument("--speed", type=positive_float, metavar="M_S", help="wanted speed, m/s")
+    goal.add_argument("--radius", type=finite_float, metavar="M", help="wanted radius, m, + left")
+    goal.add_argument(
+        "--turn-rate", type=finite_float, metavar="RAD_S", help="wanted turn rate, rad/s, + left"
+    )
+    goal.add_argument("--envelope", type=positive_float, metavar="M", help="widest swept band, m")
+    goal.add_argument("--table", action="store_true", help="build the gait table: JSON, CSV and C header")
+    _add_limits(parser)
+    how = parser.add_argument_group("how")
+    how.add_argument(
+        "--valves", choices=("wave", "free"), default="wave", help="family of gaits (default wave)"
+    )
+    how.add_argument(
+        "--intervals", type=positive_int, default=1, metavar="K", help="on-intervals, --valves free"
+    )
+    how.add_argument(
+        "--robots", type=Path, nargs="+", metavar="FILE", help="one gait for all of these robots"
+    )
+    how.add_argument("--starts", type=positive_int, default=4, metavar="N", help="starting gaits (default 4)")
+    how.add_argument("--warm", metavar="FILE", help="start from the gait of an earlier run (its gait.json)")
+    how.add_argument(
+        "--jobs", type=positive_int, default=2, metavar="N", help="processes, --table (default 2)"
+    )
+    return parser
+
+
+def _add_limits(parser: Parser) -> None:
+    add = parser.add_argument_group("limits").add_argument
+    two = {"nargs": 2, "type": positive_float}
+    add("--frequency", **two, default=(1.0, 2.0), metavar=("LO", "HI"), help="Hz (default 1 2)")  # type: ignore[arg-type]
+    add("--pressure", **two, metavar=("LO", "HI"), help="kPa (default 41 55; for --table 24 55)")  # type: ignore[arg-type]
+    add("--max-curvature", type=positive_float, metavar="1_M", help="largest curvature, 1/m")
+    add(
+        "--min-dwell",
+        type=positive_float,
+        default=0.02,
+        metavar="S",
+        help="least time on or off (default 0.02)",
+    )
+    add("--tick", type=positive_float, default=0.001, metavar="S", help="controller's tick (default 0.001)")
+    add("--valve-delay", type=finite_float, metavar="S", help="instead of the robot's own, s")
+    add(
+        "--chamber-volume",
+        type=positive_float,
+        metavar="M3",
+        help="air per fill, m^3 (default: a bore of 1/6 body width)",
+    )
+
+
+def problem_from(options: argparse.Namespace) -> CycleProblem:
+    """Return the problem that the options describe."""
+    from dataclasses import replace
+
+    from srs_opt.errors import InputError
+    from srs_opt.gait_opt.collocation.problem import CycleProblem
+    from srs_opt.gait_opt.goal import Goal
+    from srs_opt.robot import load_robot
+
+    robots: list[Robot] = [load_robot(path) for path in options.robots or [options.robot]]
+    if options.valve_delay is not None:
+        robots = [replace(r, valve_delay_s=options.valve_delay) for r in robots]
+    goal = Goal(options.objective, options.speed, options.radius, options.turn_rate, options.envelope)
+    if options.intervals > 1 and options.valves != "free":
+        raise InputError("--intervals goes with --valves free: a wave has one interval per segment and cycle")
+    if options.warm and options.valves == "free":
+        raise InputError("--warm goes with --valves wave")
+    return CycleProblem(tuple(robots), options.model, goal, limits_from(options), options.intervals)
+
+
+def limits_from(options: argparse.Namespace) -> Limits:
+    """Return the limits that the options describe."""
+    from srs_opt.gait_opt.family import TABLE_PRESSURE_KPA
+    from srs_opt.gait_opt.goal import Limits
+
+    pressure = options.pressure or (TABLE_PRESSURE_KPA if options.table else (41.0, 55.0))
+    return Limits(
+        tuple(options.frequency),
+        tuple(pressure),
+        options.min_dwell,
+        options.tick,
+        options.max_curvature,
+        options.chamber_volume,
+    )
+
+
+def run(options: argparse.Namespace) -> Answer:
+    """Optimize, certify, write the files."""
+    if options.table:
+        return _run_table(options)
+    import time
+
+    from srs_opt.files import write_json
+    from srs_opt.gait_file import load_gait
+    from srs_opt.gait_opt.figures import draw_convergence, draw_gait
+    from srs_opt.gait_opt.free import search_free
+    from srs_opt.gait_opt.report import record, summary
+    from srs_opt.gait_opt.search import search
+    from srs_opt.model.parameters import room_effects
+    from srs_opt.simulate import compiled
+
+    problem = problem_from(options)
+    for robot in problem.robots:
+        if effects := room_effects(robot):
+            say(
+                options, f"note: optimized without {', '.join(effects)}: what depends on the room has no gait"
+            )
+    warm = load_gait(options.warm, problem.limits.pressure_kpa[1]) if options.warm else None
+    begun, compiled_before = time.perf_counter(), compiled.compile_seconds
+    extra = {}
+    if options.valves == "free":
+        freed = search_free(problem, options.starts, options.seed, lambda text: say(options, text))
+        found, extra = freed.found, {"free": freed.record()}
+    else:
+        found = search(problem, options.starts, options.seed, lambda text: say(options, text), warm)
+    compile_s = compiled.compile_seconds - compiled_before
+    answer = {**record(problem, found, time.perf_counter() - begun - compile_s, compile_s), **extra}
+    files = [
+        write_json(options.out / "gait.json", answer),
+        *draw_gait(problem.robots[0], problem.model, found.orbits[0], options.out / "gait"),
+        *draw_convergence(found, options.out / "convergence"),
+    ]
+    return Answer(answer, summary(answer), found.certificate.passed, tuple(files))
+
+
+def _run_table(options: argparse.Namespace) -> Answer:
+    """Build the gait table and write it as JSON, CSV and C header."""
+    import time
+
+    from srs_opt.gait_opt.catalogue import cached_table_path
+    from srs_opt.gait_opt.export import write_csv, write_header
+    from srs_opt.gait_opt.family import build_table
+    from srs_opt.gait_opt.figures import draw_pareto
+    from srs_opt.gait_opt.table import save_table
+    from srs_opt.robot import load_robot
+
+    robot = load_robot(options.robot)
+    begun = time.perf_counter()
+    limits = limits_from(options)
+    table = build_table(robot, options.model, limits, lambda text: say(options, text), options.jobs)
+    seconds = time.perf_counter() - begun
+    files = [
+        save_table(table, options.out / "gait_table.json"),
+        write_csv(table, options.out / "gait_table.csv"),
+        write_header(table, options.out / "gait_table.h", options.tick),
+        save_table(table, cached_table_path(robot, options.model)),
+        *draw_pareto(table, options.out / "pareto"),
+    ]
+    best = max(g.speed_m_s for g in table.gaits)
+    radii = [abs(g.radius_m) for g in table.gaits if g.radius_m is not None]
+    answer = {
+        "objective": "table",
+        "gaits": len(table.gaits),
+        "speed_max_m_s": best,
+        "radius_min_m": min(radii, default=None),
+        "band_min_m": min(sum(g.envelope_m) for g in table.gaits),
+        "solve_s": seconds,
+    }
+    words = f"{len(table.gaits)} gaits up to {best:.3f} m/s in {seconds:.0f} s"
+    return Answer(answer, words, files=tuple(files))
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the command."""
+    return run_command(build_parser(), run, argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

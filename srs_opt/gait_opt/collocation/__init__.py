@@ -1,0 +1,1 @@
+"""Direct collocation of one gait cycle: point equations, sparse assembly, IPOPT."""

@@ -1,0 +1,88 @@
+"""Phases between switches in a fixed order: the mesh moves with the switch times, nothing is smoothed."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import sparse
+
+from srs_opt.gait_opt.collocation.layout import DEGREE, NODES, Mesh
+from srs_opt.gait_opt.collocation.program import Times
+
+COINCIDENT = 1e-7  # cycles; switches closer than this are one instant, their order is free
+
+
+def switch_order(switches: np.ndarray) -> np.ndarray:
+    """Return the switches' indices in the order in which they happen in a cycle, the first at time 0."""
+    fraction = np.mod(switches - switches[0] + COINCIDENT, 1.0)
+    return np.argsort(fraction, kind="stable")
+
+
+def element_counts(switches: np.ndarray, order: np.ndarray, elements: int) -> np.ndarray:
+    """Return elements per phase, about `elements` in all: by length, one at least."""
+    fraction = np.mod(switches - switches[0] + COINCIDENT, 1.0)[order]
+    lengths = np.diff(np.append(fraction, 1.0 + fraction[0]))
+    return np.maximum(np.round(lengths * elements).astype(int), 1)
+
+
+def phase_times(switches: np.ndarray, order: np.ndarray, counts: np.ndarray) -> tuple[Mesh, Times]:
+    """Return the mesh at these switch times and how it moves with them.
+
+    Parameters
+    ----------
+    switches : array
+        Switch times as the program has them (fractions of the period, whole cycles allowed).
+    order : int array
+        From :func:`switch_order`.
+    counts : int array
+        Elements of every phase.
+    """
+    n = switches.size
+    whole = np.floor(switches - switches[0] + COINCIDENT)
+    start = switches - whole
+    starts = np.append(start[order], 1.0 + start[order[0]])
+    phase_lengths = np.diff(starts)
+    lengths, offsets = np.zeros((n, n)), np.zeros(n)
+    rows, columns, data, constant, turns, edges = [], [], [], [], [], []
+    point = 0
+    for k in range(n):
+        a, b = order[k], order[(k + 1) % n]
+        shift_a, shift_b = -whole[a], -whole[b] + (1.0 if k == n - 1 else 0.0)
+        lengths[k, b] += 1.0
+        lengths[k, a] -= 1.0
+        offsets[k] = shift_b - shift_a
+        begun = set(order[: k + 1].tolist())
+        last = [whole[j] * -1.0 - (0.0 if j in begun else 1.0) for j in range(n)]
+        for e in range(counts[k]):
+            edges.append(starts[k] + phase_lengths[k] * e / counts[k])
+            for c in NODES:
+                share = (e + c) / counts[k]
+                for row, weights in ((2 * point, (1 - share, share)), (2 * point + 1, (-1.0, 1.0))):
+                    scale = 1.0 if row % 2 == 0 else 1.0 / counts[k]
+                    rows += [row, row]
+                    columns += [a, b]
+                    data += [scale * weights[0], scale * weights[1]]
+                    constant.append(scale * (weights[0] * shift_a + weights[1] * shift_b))
+                turns.append(last)
+                point += 1
+    edges.append(starts[-1])
+    matrix = sparse.csr_matrix(
+        sparse.coo_matrix((data, (rows, columns)), shape=(2 * DEGREE * int(counts.sum()), n))
+    )
+    times = Times(matrix, np.array(constant), np.array(turns), lengths, offsets)
+    return Mesh(np.array(edges) - starts[0]), times
+
+
+def exchanged(switches: np.ndarray, order: np.ndarray) -> np.ndarray | None:
+    """Return the order with every phase of zero length turned round (None if there is none)."""
+    fraction = np.mod(switches - switches[0] + COINCIDENT, 1.0)
+    new = order.copy()
+    changed = False
+    k = 1
+    while k < order.size - 1:
+        if abs(fraction[order[k + 1]] - fraction[order[k]]) < 1e3 * COINCIDENT:
+            new[k], new[k + 1] = order[k + 1], order[k]
+            changed = True
+            k += 2
+        else:
+            k += 1
+    return new if changed else None

@@ -1,0 +1,292 @@
+"""The equations at one collocation point, with exact Jacobian and Hessian, compiled once per structure.
+
+The motion is written about its own mean: the frame that travels along the mean path (an arc of
+curvature turn_rate/speed, a line when that is zero) at the mean speed. In it every state repeats after
+one cycle, straight gaits and turns obey the same smooth equations, and speed and turn rate are plain
+unknowns:
+
+    heading' = yaw rate - turn_rate
+    ahead'   = (R(heading) u)_x - speed + turn_rate * aside
+    aside'   = (R(heading) u)_y - turn_rate * ahead
+
+with the means of `ahead` and `aside` zero. The body's velocity u and yaw momentum follow the model; the
+curvature is known in closed form. Effects that make the actuators nonlinear add their *deviation* from
+the closed form as states, so that valve switches still need no mesh point.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from functools import lru_cache, partial
+from pathlib import Path
+
+import casadi as ca
+
+from srs_opt.gait_opt.collocation.curvature import periodic_curvature, time_constants
+from srs_opt.model.actuator import Actuator, ActuatorState
+from srs_opt.model.mechanics import Mechanics
+from srs_opt.model.parameters import Structure
+from srs_opt.model.registry import build
+from srs_opt.simulate.compiled import FLAGS, compiled
+
+BODY = 6  # u_x, u_y, yaw momentum, heading, ahead, aside
+BODY_NAMES = (
+    "forward velocity",
+    "sideways velocity",
+    "yaw momentum",
+    "heading",
+    "place ahead",
+    "place aside",
+)
+# optimizing the second derivatives of long robots takes compilers minutes and gains a factor of three
+_SEGMENTS_OPTIMIZED = 5
+UNOPTIMIZED = ("-O0", *FLAGS[1:])
+QUADRATURES = 3  # mean ahead, mean aside, friction work
+
+
+@dataclass(frozen=True)
+class PointKind:
+    """What fixes the equations of a collocation point.
+
+    Attributes
+    ----------
+    structure : Structure
+    intervals : int
+        On-intervals K per segment.
+    ordered : bool
+        Whether the switch order is given (times then enter smoothly) or follows from the times.
+    envelope, curvature : bool
+        Whether the rows "body's lateral reach" and "curvature" are there.
+    relaxed : bool
+        Whether valves are levels in [-1, 1], one per element and segment, in place of switch times; the
+        actuators are states then.
+    """
+
+    structure: Structure
+    intervals: int = 1
+    ordered: bool = False
+    envelope: bool = False
+    curvature: bool = False
+    relaxed: bool = False
+
+    @property
+    def segments(self) -> int:
+        """Number of segments."""
+        return self.structure.segments
+
+    @property
+    def switches(self) -> int:
+        """Number of switch times (relaxed: valve levels) that a point depends on."""
+        return self.segments if self.relaxed else 2 * self.intervals * self.segments
+
+    @property
+    def states(self) -> int:
+        """Number of states."""
+        actuator = build(self.structure)[2]
+        return BODY + (0 if actuator.linear and not self.relaxed else actuator.states)
+
+    @property
+    def paths(self) -> int:
+        """Number of path rows: lateral reach of links and arc middles, then curvatures."""
+        reach = 2 * self.structure.links - 1 if self.envelope else 0
+        return reach + (self.segments if self.curvature else 0)
+
+    @property
+    def locals(self) -> int:
+        """Number of local unknowns: states, speed, turn rate, frequency, pressure, switches, place, width."""
+        return self.states + 4 + self.switches + 2
+
+    @property
+    def outputs(self) -> int:
+        """Number of outputs: state rates times the element's duration, quadratures, path rows."""
+        return self.states + QUADRATURES + self.paths
+
+
+@dataclass(frozen=True)
+class _Symbols:
+    x: ca.SX
+    speed: ca.SX
+    turn_rate: ca.SX
+    frequency: ca.SX
+    pressure: ca.SX
+    switches: ca.SX
+    at: ca.SX
+    width: ca.SX
+    scale: ca.SX
+    turns: ca.SX
+    half_width: ca.SX
+
+    @staticmethod
+    def of(kind: PointKind) -> _Symbols:
+        names = ("speed", "turn_rate", "frequency", "pressure")
+        speed, turn_rate, frequency, pressure = (ca.SX.sym(n) for n in names)
+        return _Symbols(
+            ca.SX.sym("x", kind.states), speed, turn_rate, frequency, pressure,
+            ca.SX.sym("switches", kind.switches), ca.SX.sym("at"), ca.SX.sym("width"),
+            ca.SX.sym("scale", kind.states), ca.SX.sym("turns", kind.switches), ca.SX.sym("half_width"),
+        )  # fmt: skip
+
+    def unknowns(self) -> ca.SX:
+        return ca.vertcat(
+            self.x,
+            self.speed,
+            self.turn_rate,
+            self.frequency,
+            self.pressure,
+            self.switches,
+            self.at,
+            self.width,
+        )
+
+
+def _linear_curvature(kind: PointKind, s: _Symbols) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """Return the closed-form curvatures, their rates and the valves, (N-1, 1) each."""
+    parameters, _, actuator = build(kind.structure)
+    ones = ca.SX.ones(kind.segments, 1)
+    high, low = actuator.target(ones), actuator.target(-ones)
+    k = kind.intervals
+    columns = []
+    for i in range(kind.segments):
+        mine = slice(2 * k * i, 2 * k * (i + 1))
+        pair = (s.switches[mine][:k], s.switches[mine][k:])
+        turns = s.turns[mine] if kind.ordered else None
+        columns.append(periodic_curvature(parameters, high[i], low[i], s.at, pair, s.half_width, turns))
+    kappa, rate, valve = (ca.vertcat(*[c[j] for c in columns]) for j in range(3))
+    return kappa, rate, valve
+
+
+def _shape(kind: PointKind, actuator: Actuator, s: _Symbols, deviation: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """Return curvatures, their rates, and the rates of the actuators' deviation from the closed form.
+
+    Relaxed, the actuators' states are collocated themselves.
+    """
+    if kind.relaxed:
+        own = actuator.unstack(deviation)
+        return own.kappa, own.dkappa, actuator.rates(own, s.switches).vector()
+    kappa, dkappa, valve = _linear_curvature(kind, s)
+    if actuator.linear:
+        return kappa, dkappa, ca.SX(0, 1)
+    away = actuator.unstack(deviation)
+    state = ActuatorState(kappa + away.kappa, dkappa + away.dkappa, away.memory)
+    full = actuator.rates(state, valve)
+    tau1, tau2 = time_constants(actuator.parameters)
+    linear = (actuator.target(valve) - kappa) / (tau1 * tau2) - (1 / tau1 + 1 / tau2) * dkappa
+    rates = ca.vertcat(away.dkappa, full.dkappa - linear, *full.memory)
+    return state.kappa, state.dkappa, rates
+
+
+def _lateral_reach(m: Mechanics, heading: ca.SX, ahead: ca.SX, aside: ca.SX, bend: ca.SX) -> ca.SX:
+    """Return how far links and arc middles lie left of the mean path (curvature `bend`), (2 N - 1, 1) m."""
+    chain, length = m.chain, m.parameters["segment_length_m"]
+    xs, ys = [chain.x], [chain.y]
+    for i in range(m.links - 1):
+        chord = ca.vertcat(chain.x[i + 1] - chain.x[i], chain.y[i + 1] - chain.y[i])
+        sagitta = m.kappa[i] * length**2 / 8
+        norm = ca.sqrt(ca.dot(chord, chord))
+        xs.append((chain.x[i] + chain.x[i + 1]) / 2 + sagitta * chord[1] / norm)
+        ys.append((chain.y[i] + chain.y[i + 1]) / 2 - sagitta * chord[0] / norm)
+    x, y = ca.vertcat(*xs), ca.vertcat(*ys)
+    c, s = ca.cos(heading), ca.sin(heading)
+    room_x, room_y = ahead + c * x - s * y, aside + s * x + c * y
+    # distance to the centre of rotation minus the radius, in a form that is regular for a straight path
+    distance = ca.sqrt((bend * room_x) ** 2 + (1 - bend * room_y) ** 2)
+    return (2 * room_y - bend * (room_x**2 + room_y**2)) / (1 + distance)
+
+
+def _equations(kind: PointKind, s: _Symbols, p: ca.SX) -> ca.SX:
+    parameters, m, actuator = build(kind.structure)
+    x = s.scale * s.x
+    velocity, heading, ahead, aside = x[:3], x[3], x[4], x[5]
+    kappa, dkappa, deviation_rate = _shape(kind, actuator, s, x[BODY:])
+    body_rate, power = m.velocity_rate(ca.SX.zeros(3, 1), velocity)
+    yaw_rate = m.yaw_rate(velocity[2])
+    c, sn = ca.cos(heading), ca.sin(heading)
+    rates = ca.vertcat(
+        body_rate,
+        yaw_rate - s.turn_rate,
+        c * x[0] - sn * x[1] - s.speed + s.turn_rate * aside,
+        sn * x[0] + c * x[1] - s.turn_rate * ahead,
+        deviation_rate,
+    )
+    duration = s.width / s.frequency
+    quadratures = ca.vertcat(s.width * s.x[4], s.width * s.x[5], duration * power)
+    paths = []
+    if kind.envelope:
+        paths.append(_lateral_reach(m, heading, ahead, aside, s.turn_rate / s.speed))
+    if kind.curvature:
+        paths.append(m.kappa)
+    out = ca.vertcat(duration * rates / s.scale, quadratures, *paths)
+    for old, new in ((m.dkappa, dkappa), (m.kappa, kappa)):
+        out = ca.substitute(out, old, new)
+    place = parameters.names.index("pressure_kpa")
+    filled = ca.vertcat(p[:place], s.pressure, s.frequency, p[place + 2 :])
+    return ca.substitute(out, parameters.vector, filled)
+
+
+@lru_cache(maxsize=1)
+def _sources() -> str:
+    folder = Path(__file__).parent
+    digest = hashlib.sha256()
+    for name in ("curvature.py", "point.py"):
+        digest.update((folder / name).read_bytes())
+    return digest.hexdigest()[:16]
+
+
+@dataclass(frozen=True)
+class PointFunctions:
+    """Compiled ``value(y, scale, p, half_width, turns)``, ``slope(...)`` (its Jacobian) and
+    ``bend(y, scale, p, half_width, turns, multipliers)`` (the Hessian's lower triangle), with sparsities."""
+
+    value: ca.Function
+    slope: ca.Function
+    bend: ca.Function
+    slope_sparsity: ca.Sparsity
+    bend_sparsity: ca.Sparsity
+
+
+@lru_cache(maxsize=32)
+def point_functions(kind: PointKind) -> PointFunctions:
+    """Return the point's equations and derivatives, compiled and cached on disk by content."""
+
+    def make(what: str) -> ca.Function:
+        s = _Symbols.of(kind)
+        p = ca.SX.sym("p", build(kind.structure)[0].vector.numel())
+        y, out = s.unknowns(), _equations(kind, s, p)
+        inputs = [y, s.scale, p, s.half_width, s.turns]
+        if what == "value":
+            return ca.Function("value", inputs, [out], {"cse": True})
+        if what == "slope":
+            return ca.Function("slope", inputs, [ca.jacobian(out, y)], {"cse": True})
+        multipliers = ca.SX.sym("multipliers", out.numel())
+        hessian = ca.hessian(ca.dot(multipliers, out), y)[0]
+        return ca.Function("bend", [*inputs, multipliers], [ca.tril(hessian)], {"cse": True})
+
+    large = kind.segments > _SEGMENTS_OPTIMIZED or kind.states > BODY
+    value, slope, bend = (
+        compiled(
+            f"gait_opt {what} {kind} {_sources()}",
+            partial(make, what),
+            UNOPTIMIZED if large and what == "bend" else FLAGS,
+        )
+        for what in ("value", "slope", "bend")
+    )
+    return PointFunctions(value, slope, bend, slope.sparsity_out(0), bend.sparsity_out(0))
+
+
+@lru_cache(maxsize=32)
+def linear_shape(kind: PointKind, points: int) -> ca.Function:
+    """Return ``(switches, frequency, pressure, at (1, points), p, half_width) -> (kappa, dkappa)``.
+
+    Both are (N-1, points).
+    """
+    s = _Symbols.of(kind)
+    parameters = build(kind.structure)[0]
+    p = ca.SX.sym("p", parameters.vector.numel())
+    place = parameters.names.index("pressure_kpa")
+    filled = ca.vertcat(p[:place], s.pressure, s.frequency, p[place + 2 :])
+    shapes = [ca.substitute(v, parameters.vector, filled) for v in _linear_curvature(kind, s)[:2]]
+    single = ca.Function(
+        "shape", [s.switches, s.frequency, s.pressure, s.at, p, s.half_width], shapes, {"cse": True}
+    )
+    return single.map("shapes", "serial", points, [0, 1, 2, 4, 5], [])

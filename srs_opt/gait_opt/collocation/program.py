@@ -1,0 +1,297 @@
+"""The nonlinear program of one gait cycle: assembled from compiled point equations, solved by IPOPT."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from scipy import sparse
+
+from srs_opt.gait_opt.collocation.layout import (
+    ENVELOPE_UNIT_M,
+    PRESSURE_UNIT_KPA,
+    ROBOT_UNKNOWNS,
+    Layout,
+    local_inputs,
+    row_outputs,
+)
+from srs_opt.gait_opt.collocation.point import PointKind, point_functions
+from srs_opt.gait_opt.collocation.sparse import Gather, hessian_gather, jacobian_gather, to_dm
+from srs_opt.model.registry import build
+
+GOAL_NUMBERS = ("min_dwell_s", "radius_m", "envelope_m", "chamber_volume_m3", "weight_n")
+
+
+@dataclass(frozen=True)
+class Times:
+    """Place and width of the points by the switch times: ``matrix @ switches + constant`` (2 points each).
+
+    `turns` (points, switches) fixes the switch order; ``lengths @ switches + offsets`` are the phases'
+    lengths, which must not be negative.
+    """
+
+    matrix: sparse.csr_matrix
+    constant: np.ndarray
+    turns: np.ndarray
+    lengths: np.ndarray
+    offsets: np.ndarray
+
+
+def goal_rows(
+    layout: Layout, objective: str, radius: bool, envelope: bool, times: Times | None = None
+) -> tuple[ca.Function, int]:
+    """Return ``(head unknowns, goal numbers) -> rows`` and how many of them are equalities (the first).
+
+    The head is what all robots share, then five unknowns per robot. Rows: radius (= 0); dwell (>= 0);
+    phases' lengths (>= 0); merit of every robot minus the worst (>= 0); envelope (>= 0).
+    """
+    robots = len(layout.kinds)
+    shared = ca.SX.sym("shared", layout.shared)
+    own = [ca.SX.sym(f"own{r}", len(ROBOT_UNKNOWNS)) for r in range(robots)]
+    number = {name: ca.SX.sym(name) for name in GOAL_NUMBERS}
+    frequency, pressure, merit = shared[0], PRESSURE_UNIT_KPA * shared[1], shared[layout.merit]
+    rows: list[ca.SX] = []
+    if radius:
+        rows.append(own[0][0] - number["radius_m"] * own[0][1])
+    k = layout.kinds[0].intervals
+    relaxed = layout.kinds[0].relaxed
+    for i in range(0 if relaxed else layout.kinds[0].segments):
+        switches = ca.vertsplit(shared[2 + 2 * k * i : 2 + 2 * k * (i + 1)])
+        on, off = switches[:k], switches[k:]
+        for start, end, following in zip(on, off, [*on[1:], on[0] + 1]):
+            least = number["min_dwell_s"] * frequency
+            rows += [end - start - least, following - end - least]
+    if times is not None:
+        rows.append(ca.DM(times.lengths) @ shared[2 : 2 + layout.switches] + times.offsets)
+    fills = 2 * k * layout.kinds[0].segments
+    for u in own:
+        speed, turn_rate, work, left, right = ca.vertsplit(u)
+        air = fills * number["chamber_volume_m3"] * pressure * 1e3
+        value = {
+            "speed": speed,
+            "transport": -(work + air) * frequency / (number["weight_n"] * speed),
+            "turn": speed,
+            "tightest": -10 * speed / turn_rate,
+            "slim": -(left + right),
+        }[objective]
+        rows.append(value - merit)
+        if envelope:
+            rows.append(number["envelope_m"] / ENVELOPE_UNIT_M - left - right)
+    head = ca.vertcat(shared, *own)
+    function = ca.Function("goal", [head, ca.vertcat(*number.values())], [ca.vertcat(*rows)])
+    return function, int(radius)
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Where IPOPT stopped.
+
+    Attributes
+    ----------
+    z, multipliers_g, multipliers_z : arrays
+    rows : array
+        Values of the constraints.
+    status : str
+        IPOPT's own word.
+    iterations : int
+    converged : bool
+    """
+
+    z: np.ndarray
+    multipliers_g: np.ndarray
+    multipliers_z: np.ndarray
+    rows: np.ndarray
+    status: str
+    iterations: int
+    converged: bool
+
+
+class Program:
+    """One problem: kinds of equations, number of elements, kind of goal. Numbers come with each solve."""
+
+    def __init__(
+        self, layout: Layout, objective: str, radius: bool, envelope: bool, times: Times | None = None
+    ) -> None:
+        self.layout = layout
+        self.times = times
+        self.goal, self.goal_equalities = goal_rows(layout, objective, radius, envelope, times)
+        head = [np.arange(layout.shared)]
+        head += [layout.start(r) + np.arange(len(ROBOT_UNKNOWNS)) for r in range(len(layout.kinds))]
+        self.head = np.concatenate(head)
+        self._parts = [self._assemble(r) for r in range(len(layout.kinds))]
+        self._solvers: dict[tuple[Any, ...], ca.Function] = {}
+        self._build()
+
+    def _assemble(self, robot: int) -> dict[str, Any]:
+        layout, kind = self.layout, self.layout.kinds[robot]
+        functions = point_functions(kind)
+        inputs = local_inputs(layout, robot, None if self.times is None else self.times.matrix)
+        outputs, fixed = row_outputs(layout, robot)
+        points = layout.points
+        last_two = np.tile([kind.locals - 2, kind.locals - 1], points)
+        rows = np.arange(points).repeat(2) * kind.locals + last_two
+        ones, shape = np.ones(2 * points), (points * kind.locals, 2 * points)
+        place = sparse.csr_matrix((ones, (rows, np.arange(2 * points))), shape=shape)
+        return {
+            "functions": functions,
+            "kind": kind,
+            "inputs": to_dm(inputs),
+            "place": to_dm(place),
+            "outputs": to_dm(outputs),
+            "outputs_t": to_dm(outputs.T),
+            "fixed": to_dm(fixed),
+            "jacobian": jacobian_gather(
+                functions.slope_sparsity, points, inputs, outputs, sparse.coo_matrix(fixed)
+            ),
+            "hessian": hessian_gather(functions.bend_sparsity, points, inputs),
+            "rows": outputs.shape[0],
+        }
+
+    def _build(self) -> None:
+        layout = self.layout
+        z = ca.MX.sym("z", layout.size)
+        self.parameter_sizes = [2 * layout.points, len(GOAL_NUMBERS), 1]
+        for kind in layout.kinds:
+            self.parameter_sizes += [
+                build(kind.structure)[0].vector.numel(), kind.states, kind.switches * layout.points
+            ]  # fmt: skip
+        parameters = ca.MX.sym("p", sum(self.parameter_sizes))
+        mesh, numbers, half_width, *rest = ca.vertsplit(
+            parameters, np.cumsum([0, *self.parameter_sizes]).tolist()
+        )
+        self.row_counts = [part["rows"] for part in self._parts] + [self.goal.size1_out(0)]
+        total = sum(self.row_counts)
+        lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", total)
+        rows, jacobians = [], []
+        hessian = ca.MX(layout.size, layout.size)
+        splits = ca.vertsplit(lam_g, np.cumsum([0, *self.row_counts]).tolist())
+        for r, part in enumerate(self._parts):
+            g, jac, hess = self._robot(part, z, mesh, [half_width, *rest[3 * r : 3 * r + 3]], splits[r])
+            rows.append(g)
+            jacobians.append(jac)
+            hessian += hess
+        head = z[self.head.tolist()]
+        g, jac, hess = self._goal_derivatives(head, numbers, splits[-1])
+        rows.append(g)
+        spread = _selection(self.head, layout.size)
+        jacobians.append(jac @ spread)
+        hessian += ca.triu(spread.T @ hess @ spread)
+        f = -z[layout.merit]
+        gradient = ca.DM(layout.size, 1)
+        gradient[layout.merit] = -1.0
+        g, jac = ca.vertcat(*rows), ca.vertcat(*jacobians)
+        names = ["x", "p"]
+        self._nlp = {"x": z, "p": parameters, "f": f, "g": g}
+        self._options = {
+            "grad_f": ca.Function(
+                "grad_f", [z, parameters], [f, ca.densify(gradient)], names, ["f", "grad:f:x"]
+            ),
+            "jac_g": ca.Function("jac_g", [z, parameters], [g, jac], names, ["g", "jac:g:x"]),
+            "hess_lag": ca.Function(
+                "hess_lag", [z, parameters, lam_f, lam_g], [hessian],
+                ["x", "p", "lam:f", "lam:g"], ["triu:hess:gamma:x:x"],
+            ),
+        }  # fmt: skip
+        self.rows = total
+        self.evaluate = ca.Function("rows", [z, parameters], [g])
+
+    def _robot(
+        self, part: dict[str, Any], z: ca.MX, mesh: ca.MX, own: list[ca.MX], lam: ca.MX
+    ) -> tuple[ca.MX, ca.MX, ca.MX]:
+        kind: PointKind = part["kind"]
+        points = self.layout.points
+        y = ca.reshape(part["inputs"] @ z + part["place"] @ mesh, kind.locals, points)
+        half_width, p, scale, turns = own
+        turns = ca.reshape(turns, kind.switches, points)
+        functions = part["functions"]
+
+        def mapped(function: ca.Function) -> ca.Function:
+            return function.map(f"{function.name()}_all", "serial", points, [1, 2, 3], [])
+
+        value = ca.vec(mapped(functions.value)(y, scale, p, half_width, turns))
+        g = part["outputs"] @ value + part["fixed"] @ z
+        slope = mapped(functions.slope)(y, scale, p, half_width, turns)
+        jacobian: Gather = part["jacobian"]
+        multipliers = ca.reshape(part["outputs_t"] @ lam, kind.outputs, points)
+        bend = mapped(functions.bend)(y, scale, p, half_width, turns, multipliers)
+        hessian: Gather = part["hessian"]
+        return g, jacobian(_nonzeros(slope)), hessian(_nonzeros(bend))
+
+    def _goal_derivatives(self, head: ca.MX, numbers: ca.MX, lam: ca.MX) -> tuple[ca.MX, ca.MX, ca.MX]:
+        h, n, m = ca.SX.sym("h", self.head.size), ca.SX.sym("n", numbers.numel()), ca.SX.sym("m", lam.numel())
+        rows = self.goal(h, n)
+        first = ca.Function("goal_slope", [h, n], [rows, ca.jacobian(rows, h)])
+        second = ca.Function("goal_bend", [h, n, m], [ca.hessian(ca.dot(m, rows), h)[0]])
+        g, jac = first(head, numbers)
+        return g, jac, second(head, numbers, lam)
+
+    def _solver(self, **changes: Any) -> ca.Function:
+        key = tuple(sorted(changes.items()))
+        if key not in self._solvers:
+            ipopt = {
+                "print_level": 0, "sb": "yes", "mu_strategy": "adaptive", "max_iter": 300, "tol": 1e-6,
+                "linear_solver": "mumps", "acceptable_tol": 1e-5, "acceptable_iter": 8,
+                "warm_start_init_point": "no", "nlp_scaling_method": "none",
+                **changes,
+            }  # fmt: skip
+            options = {
+                **self._options, "ipopt": ipopt, "print_time": False, "calc_lam_p": False,
+                "no_nlp_grad": True, "error_on_fail": False, "show_eval_warnings": False,
+            }  # fmt: skip
+            self._solvers[key] = ca.nlpsol("gait", "ipopt", self._nlp, options)
+        return self._solvers[key]
+
+    def solve(
+        self,
+        z: np.ndarray,
+        parameters: np.ndarray,
+        bounds_z: tuple[np.ndarray, np.ndarray],
+        bounds_g: tuple[np.ndarray, np.ndarray],
+        warm: Solution | None = None,
+        options: Mapping[str, Any] | None = None,
+    ) -> Solution:
+        """Solve from `z`; with `warm`, multipliers are taken over and the barrier starts low."""
+        arguments = {
+            "x0": z, "p": parameters,
+            "lbx": bounds_z[0], "ubx": bounds_z[1], "lbg": bounds_g[0], "ubg": bounds_g[1],
+        }  # fmt: skip
+        changes = dict(options or {})
+        if warm is not None:
+            changes = {
+                "warm_start_init_point": "yes", "mu_init": 1e-4, "warm_start_bound_push": 1e-6,
+                "warm_start_mult_bound_push": 1e-6, "mu_strategy": "monotone", **changes,
+            }  # fmt: skip
+            arguments |= {"lam_g0": warm.multipliers_g, "lam_x0": warm.multipliers_z}
+        solver = self._solver(**changes)
+        out = solver(**arguments)
+        stats = solver.stats()
+        if stats["return_status"] == "User_Requested_Stop":
+            raise KeyboardInterrupt  # IPOPT takes Ctrl-C for itself
+        return Solution(
+            np.asarray(out["x"]).ravel(),
+            np.asarray(out["lam_g"]).ravel(),
+            np.asarray(out["lam_x"]).ravel(),
+            np.asarray(out["g"]).ravel(),
+            stats["return_status"],
+            int(stats["iter_count"]),
+            bool(stats["success"]),
+        )
+
+
+def _selection(indices: np.ndarray, size: int) -> ca.DM:
+    ones = np.ones(indices.size)
+    return to_dm(sparse.csr_matrix((ones, (np.arange(indices.size), indices)), shape=(indices.size, size)))
+
+
+def _nonzeros(matrix: ca.MX) -> ca.MX:
+    return matrix.nz[:] if matrix.nnz() != matrix.numel() else ca.vec(matrix)
+
+
+@lru_cache(maxsize=32)
+def program(layout: Layout, objective: str, radius: bool, envelope: bool) -> Program:
+    """Return the problem with a fixed mesh; built once per process."""
+    return Program(layout, objective, radius, envelope)

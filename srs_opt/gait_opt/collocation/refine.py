@@ -1,0 +1,72 @@
+"""Mesh refinement from the defect between nodes: where the polynomials disobey the equations of motion."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from srs_opt.gait_opt.collocation.layout import DEGREE, NODES, PRESSURE_UNIT_KPA, Mesh
+from srs_opt.gait_opt.collocation.point import BODY, point_functions
+from srs_opt.gait_opt.collocation.program import Program, Solution
+
+BETWEEN = np.array([0.08, 0.4, 0.85])  # places inside an element, away from its nodes
+_ORDER = 4.0
+_MOST_GROWTH = 3.0
+
+
+def _basis() -> tuple[np.ndarray, np.ndarray]:
+    """Return values and slopes of the Lagrange basis (nodes 0, c1, c2, c3) at BETWEEN, (4, 3) each."""
+    nodes = np.concatenate([[0.0], NODES])
+    values, slopes = [], []
+    for j in range(DEGREE + 1):
+        others = np.delete(nodes, j)
+        polynomial = np.poly1d(others, r=True) / np.prod(nodes[j] - others)
+        values.append(polynomial(BETWEEN))
+        slopes.append(polynomial.deriv()(BETWEEN))
+    return np.array(values), np.array(slopes)
+
+
+def defects(p: Program, solution: Solution, parameters: np.ndarray, mesh: Mesh, robot: int = 0) -> np.ndarray:
+    """Return the largest scaled defect of the body's velocity inside every element, (elements,).
+
+    The defect is the difference between slope and equations, times the element's width: about the local
+    error in units of the states' typical sizes.
+    """
+    layout, kind = p.layout, p.layout.kinds[robot]
+    n, s = mesh.elements, kind.states
+    sizes = np.cumsum([0, *p.parameter_sizes])
+    half_width = parameters[sizes[2]]
+    numbers, scale = (parameters[sizes[3 + 3 * robot + k] : sizes[4 + 3 * robot + k]] for k in range(2))
+    x = solution.z[layout.states(robot)].reshape(n, DEGREE, s)
+    nodes = np.concatenate([np.roll(x[:, -1:], 1, axis=0), x], axis=1)
+    values, slopes = _basis()
+    between = np.einsum("ejs,jb->ebs", nodes, values)
+    slope = np.einsum("ejs,jb->ebs", nodes, slopes)
+    width = np.diff(mesh.edges)
+    at = mesh.edges[:-1, None] + width[:, None] * BETWEEN
+    z = solution.z
+    own = layout.start(robot)
+    fixed = np.concatenate([z[own : own + 2], [z[0], PRESSURE_UNIT_KPA * z[1]], z[2 : 2 + layout.switches]])
+    points = n * BETWEEN.size
+    y = np.concatenate(
+        [
+            between.reshape(points, s),
+            np.tile(fixed, (points, 1)),
+            at.reshape(points, 1),
+            np.repeat(width, BETWEEN.size)[:, None],
+        ],
+        axis=1,
+    )
+    function = point_functions(kind).value.map("value_between", "serial", points, [1, 2, 3], [])
+    turns = parameters[sizes[5 + 3 * robot] : sizes[6 + 3 * robot]].reshape(n, DEGREE, kind.switches)
+    turns = turns[:, : BETWEEN.size].reshape(points, kind.switches).T
+    rates = np.asarray(function(y.T, scale, numbers, half_width, turns))[:s].T.reshape(n, BETWEEN.size, s)
+    return np.abs(slope - rates)[:, :, : min(3, BODY)].max(axis=(1, 2))
+
+
+def refined_counts(defect: np.ndarray, counts: np.ndarray, tolerance: float) -> np.ndarray:
+    """Return elements per phase that should bring every defect to `tolerance`; counts only grow."""
+    phase = np.repeat(np.arange(counts.size), counts)
+    worst = np.zeros(counts.size)
+    np.maximum.at(worst, phase, defect)
+    growth = np.clip((np.maximum(worst, 1e-12) / tolerance) ** (1 / _ORDER), 1.0, _MOST_GROWTH)
+    return np.ceil(counts * growth).astype(int)

@@ -1,0 +1,218 @@
+"""From a starting gait to an optimal one: a ladder of friction smoothing speeds, each rung by collocation.
+
+Friction that nearly sticks makes the problem stiff and its landscape rugged; smoothed friction does not.
+Every rung starts from the *simulated* orbit of the gait so far (primal feasible whatever the mesh) and may
+move the gait by a limited reach; a rung whose limits bind is repeated. What counts at the end is the
+simulated gait, never the collocation's own number.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from srs_opt.errors import NoAnswerError
+from srs_opt.gait import Gait
+from srs_opt.gait_opt.collocation.explain import explained
+from srs_opt.gait_opt.collocation.guess import gait_from, unknowns_from_orbits
+from srs_opt.gait_opt.collocation.layout import Mesh
+from srs_opt.gait_opt.collocation.problem import CycleProblem
+from srs_opt.gait_opt.collocation.program import Program, Solution
+from srs_opt.gait_opt.score import Score, score
+from srs_opt.orbit.steady import Orbit, steady_gait
+
+_FREQUENCY_REACH = 3.0  # per switch reach, Hz
+_PRESSURE_REACH = 4.0  # per switch reach, units of 50 kPa
+_IPOPT = {"mu_strategy": "monotone", "mu_init": 1e-3, "max_iter": 80}
+_UNIFORM_SHARE = 0.5  # of the mesh; the rest follows the simulation's steps
+_STATE_LIMIT = 4.0  # scaled states stay below
+
+
+@dataclass(frozen=True)
+class Rung:
+    """One rung: smoothing speed (m/s), elements of the mesh, reach of the switches (cycles), repeats."""
+
+    friction_speed_m_s: float
+    elements: int
+    reach: float
+    repeats: int = 3
+
+
+@dataclass(frozen=True)
+class Step:
+    """What one solve did.
+
+    Attributes
+    ----------
+    rung : Rung
+    speed_m_s, simulated_m_s : float
+        By collocation and by simulation at the rung's smoothing speed.
+    iterations : int
+    status : str
+    """
+
+    rung: Rung
+    speed_m_s: float
+    simulated_m_s: float
+    iterations: int
+    trouble: str = ""
+    elements: int = 0
+    defect: float | None = None
+
+    @property
+    def relative_error(self) -> float:
+        """Collocation against simulation."""
+        return abs(self.speed_m_s - self.simulated_m_s) / max(abs(self.simulated_m_s), 1e-9)
+
+
+@dataclass(frozen=True)
+class Climb:
+    """The result of a ladder: the gait, its orbits at the robots' own friction, the steps taken."""
+
+    gait: Gait
+    orbits: tuple[Orbit, ...]
+    score: Score
+    steps: tuple[Step, ...] = field(default=())
+
+    @property
+    def iterations(self) -> int:
+        """IPOPT's iterations over all steps."""
+        return sum(s.iterations for s in self.steps)
+
+
+Bounds = tuple[np.ndarray, np.ndarray]
+Report = Callable[[Step, Score], None]
+
+
+def ladder(own_m_s: float, reach: float = 0.1) -> tuple[Rung, ...]:
+    """Return the rungs from strongly smoothed friction to the robot's own `own_m_s`."""
+    rungs = [Rung(v, n, reach, 4) for v, n in ((0.1, 40), (0.03, 40), (0.01, 50)) if v > 1.5 * own_m_s]
+    rungs += [Rung(0.004, 64, reach / 2, 2)] if own_m_s < 0.003 else []
+    rungs += [Rung(v, 80, reach / 3, 2) for v in (0.002, 0.001, 0.0005) if v > 1.5 * own_m_s]
+    return (*rungs, Rung(own_m_s, 80, reach / 3, 3))
+
+
+def orbits_of(
+    problem: CycleProblem,
+    gait: Gait,
+    friction_speed_m_s: float = 0.0,
+    guesses: tuple[Orbit, ...] | None = None,
+) -> tuple[Orbit, ...]:
+    """Return the steady orbits of all robots, friction smoothed at least by `friction_speed_m_s`."""
+    found = []
+    for k, robot in enumerate(problem.robots):
+        own = max(robot.friction_speed_m_s, friction_speed_m_s)
+        smoothed = replace(robot, friction_speed_m_s=own)
+        guess = None if guesses is None else guesses[k].velocity
+        found.append(steady_gait(smoothed, gait, problem.model, guess=guess))
+    return tuple(found)
+
+
+def climb(problem: CycleProblem, gait: Gait, rungs: tuple[Rung, ...], report: Report | None = None) -> Climb:
+    """Return the gait that the rungs lead to, from `gait`.
+
+    Raises
+    ------
+    NoAnswerError
+        If the starting gait itself has no steady state.
+    """
+    steps: list[Step] = []
+    for rung in rungs:
+        gait, taken = _rung(problem, gait, rung, report)
+        steps += taken
+    orbits = orbits_of(problem, gait)
+    return Climb(gait, orbits, score(problem, gait, orbits), tuple(steps))
+
+
+def _rung(problem: CycleProblem, gait: Gait, rung: Rung, report: Report | None) -> tuple[Gait, list[Step]]:
+    steps = []
+    orbits = orbits_of(problem, gait, rung.friction_speed_m_s)
+    best = score(problem, gait, orbits)
+    reach = rung.reach
+    for _ in range(rung.repeats):
+        solution, p, binding = solve_from(problem, gait, orbits, rung, reach)
+        trial = gait_from(p.layout, solution.z)
+        try:
+            trial_orbits = orbits_of(problem, trial, rung.friction_speed_m_s)
+        except NoAnswerError:
+            reach /= 3
+            continue
+        found = score(problem, trial, trial_orbits)
+        speed = float(solution.z[p.layout.unknown(0, "speed")])
+        trouble = explained(p, solution, trial)
+        steps.append(
+            Step(rung, speed, trial_orbits[0].speed_m_s, solution.iterations, trouble, p.layout.elements)
+        )
+        better = found.total > best.total
+        if better:
+            gait, orbits, gained, best = trial, trial_orbits, found.total - best.total, found
+        if report is not None:
+            report(steps[-1], best)
+        if better and (not binding or gained < 1e-4):
+            break
+        if not better:
+            reach /= 3
+            if solution.converged and not binding:
+                break
+    return gait, steps
+
+
+def mesh_for(orbits: tuple[Orbit, ...], elements: int) -> Mesh:
+    """Return a mesh as dense as the steps that the simulation needed, half uniform, shared by all robots."""
+    grid = np.linspace(0.0, 1.0, 1001)
+    level = elements * _UNIFORM_SHARE * grid
+    for orbit in orbits:
+        gait = orbit.gait
+        times = orbit.time_s / gait.period_s
+        count = np.interp(grid, times, np.arange(times.size) / (times.size - 1))
+        first = gait.intervals[0][0][0] / gait.period_s
+        shifted = np.interp(
+            grid + first, np.concatenate([grid, grid[1:] + 1]), np.concatenate([count, count[1:] + 1])
+        )
+        level = level + elements * (1 - _UNIFORM_SHARE) / len(orbits) * (shifted - shifted[0])
+    return Mesh(np.interp(np.arange(elements + 1), level * elements / level[-1], grid))
+
+
+def solve_from(
+    problem: CycleProblem,
+    gait: Gait,
+    orbits: tuple[Orbit, ...],
+    rung: Rung,
+    reach: float,
+    mesh: Mesh | None = None,
+) -> tuple[Solution, Program, bool]:
+    """Solve one program from simulated orbits; also tell whether the reach was binding."""
+    mesh = mesh or mesh_for(orbits, rung.elements)
+    p = problem.program(mesh.elements)
+    z, scales = unknowns_from_orbits(p.layout, list(problem.robots), list(orbits), mesh)
+    parameters = problem.parameters(p, mesh, scales, rung.friction_speed_m_s)
+    z[p.layout.merit] = score(problem, gait, orbits).merit
+    unknowns, rows, binding = bounded(problem, p, z, reach)
+    solution = p.solve(z, parameters, unknowns, rows, options=_IPOPT)
+    return solution, p, binding(solution.z)
+
+
+def bounded(
+    problem: CycleProblem, p: Program, z: np.ndarray, reach: float
+) -> tuple[Bounds, Bounds, Callable[[np.ndarray], bool]]:
+    """Return bounds of unknowns and rows, the gait kept within reach of `z`, and whether the reach binds."""
+    (low, high), rows = problem.bounds(p)
+    part = slice(0, 2 + p.layout.switches)
+    span = np.full(2 + p.layout.switches, reach)
+    span[0], span[1] = _FREQUENCY_REACH * reach, _PRESSURE_REACH * reach
+    limit_low, limit_high = low[part].copy(), high[part].copy()
+    low[part] = np.clip(z[part] - span, limit_low, limit_high)
+    high[part] = np.clip(z[part] + span, limit_low, limit_high)
+    for r in range(len(problem.robots)):
+        states = p.layout.states(r)
+        low[states], high[states] = -_STATE_LIMIT, _STATE_LIMIT
+
+    def binding(found: np.ndarray) -> bool:
+        margin = 1e-3 * span
+        at_low = (found[part] < low[part] + margin) & (low[part] > limit_low + margin)
+        at_high = (found[part] > high[part] - margin) & (high[part] < limit_high - margin)
+        return bool((at_low | at_high).any())
+
+    return (low, high), rows, binding

@@ -1,0 +1,107 @@
+"""The JSON object and the words of a search's result."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from srs_opt.gait import Gait, published_wave
+from srs_opt.gait_opt.collocation.problem import CycleProblem
+from srs_opt.gait_opt.score import transport_cost
+from srs_opt.gait_opt.search import Found
+from srs_opt.orbit.steady import Orbit, steady_gait
+
+
+def wave_parameters(gait: Gait) -> tuple[list[float], list[float]] | None:
+    """Return phase (rad, in [0, 2 pi)) and offset per segment; None unless one interval per segment."""
+    if any(len(pairs) != 1 for pairs in gait.intervals):
+        return None
+    phases, offsets = [], []
+    for ((on, off),) in gait.intervals:
+        share = (off - on) % gait.period_s / gait.period_s
+        angle = math.pi * (share - 0.5)
+        phases.append((-angle - 2 * math.pi * on / gait.period_s) % (2 * math.pi))
+        offsets.append(math.sin(angle))
+    return phases, offsets
+
+
+def switches(gait: Gait) -> list[dict[str, Any]]:
+    """Return the on-intervals as the JSON lists them, segments from 1 (tail)."""
+    return [
+        {"segment": i, "on_s": on, "off_s": off}
+        for i, pairs in enumerate(gait.intervals, start=1)
+        for on, off in pairs
+    ]
+
+
+def baseline(problem: CycleProblem) -> dict[str, Any]:
+    """Return the published gait's motion at the upper limits of frequency and pressure."""
+    robot, limits = problem.robots[0], problem.limits
+    frequency, pressure = limits.frequency_hz[1], limits.pressure_kpa[1]
+    gait = published_wave(robot, frequency, pressure).gait()
+    orbit = steady_gait(robot, gait, problem.model)
+    return {
+        "speed_m_s": orbit.speed_m_s,
+        "turn_rate_rad_s": orbit.turn_rate_rad_s,
+        "cost_of_transport": transport_cost(problem, gait, 0, orbit),
+        "envelope_m": list(orbit.envelope_m),
+        "frequency_hz": frequency,
+        "pressure_kpa": pressure,
+    }
+
+
+def record(problem: CycleProblem, found: Found, solve_s: float, compile_s: float) -> dict[str, Any]:
+    """Return the JSON object of the command."""
+    gait, orbit = found.gait, found.orbits[0]
+    wave = wave_parameters(gait)
+    return {
+        "objective": problem.goal.objective,
+        "speed_m_s": orbit.speed_m_s,
+        "turn_rate_rad_s": orbit.turn_rate_rad_s,
+        "radius_m": orbit.radius_m,
+        "cost_of_transport": transport_cost(problem, gait, 0, orbit),
+        "envelope_m": list(orbit.envelope_m),
+        "frequency_hz": gait.frequency_hz,
+        "pressure_kpa": gait.pressure_kpa,
+        "phase_rad": None if wave is None else wave[0],
+        "offset": None if wave is None else wave[1],
+        "switches": switches(gait),
+        "robots": [_motion(r.name, o) for r, o in zip(problem.robots, found.orbits)],
+        "baseline": baseline(problem),
+        "certificate": found.certificate.record(),
+        "starts": len(found.merits),
+        "merits": list(found.merits),
+        "iterations": found.iterations,
+        "interrupted": found.interrupted,
+        "solve_s": solve_s,
+        "compile_s": compile_s,
+    }
+
+
+def _motion(name: str, orbit: Orbit) -> dict[str, Any]:
+    return {"robot": name, "speed_m_s": orbit.speed_m_s, "turn_rate_rad_s": orbit.turn_rate_rad_s}
+
+
+def summary(answer: dict[str, Any]) -> str:
+    """Return the result in words."""
+    speed, radius = answer["speed_m_s"], answer["radius_m"]
+    base = answer["baseline"]["speed_m_s"]
+    way = "straight"
+    if radius is not None:
+        way = f"on a radius of {abs(radius):.3f} m to the {'left' if radius > 0 else 'right'}"
+    right, left = answer["envelope_m"]
+    certificate = answer["certificate"]
+    lines = [
+        f"{speed:.4f} m/s {way} at {answer['frequency_hz']:.3f} Hz and {answer['pressure_kpa']:.2f} kPa; "
+        f"the published gait makes {base:.4f} m/s",
+        f"  swept band {right:.4f} m to the right, {left:.4f} m to the left; "
+        f"cost of transport {answer['cost_of_transport']:.2f}",
+        f"  certificate: {'passed' if certificate['passed'] else 'FAILED'}; collocation off by "
+        f"{100 * certificate['relative_error']:.2f} %, "
+        f"gap after 50 cycles {certificate['periodicity_gap']:.1e}, "
+        f"largest Floquet multiplier {certificate['largest_floquet_multiplier']:.2f}",
+    ]
+    lines += [f"  {failure}" for failure in certificate["failures"]]
+    if answer["interrupted"]:
+        lines.append("  interrupted: this is the best gait found until then")
+    return "\n".join(lines)

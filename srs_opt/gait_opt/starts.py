@@ -1,0 +1,71 @@
+"""Where the search begins: the published gait, then quasi-random waves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from srs_opt.errors import NoAnswerError
+from srs_opt.gait import Gait, Wave, published_wave
+from srs_opt.gait_opt.aim import aimed
+from srs_opt.gait_opt.collocation.problem import CycleProblem
+from srs_opt.gait_opt.goal import Goal
+from srs_opt.orbit.steady import steady_gait
+
+_SMOOTHED_M_S = 0.1
+
+
+def starting_gaits(problem: CycleProblem, count: int, seed: int) -> list[Gait]:
+    """Return `count` gaits inside the limits; the first is the published one.
+
+    The others are waves whose lag, its spread, frequency and pressure come from a scrambled Sobol sequence.
+    """
+    from scipy.stats import qmc
+
+    robot, limits = problem.robots[0], problem.limits
+    middle = tuple((a + b) / 2 for a, b in (limits.frequency_hz, limits.pressure_kpa))
+    gaits = [published_wave(robot, limits.frequency_hz[1], middle[1]).gait()]
+    segments = robot.segments
+    sampler = qmc.Sobol(3 + segments, seed=seed)
+    wholeturn = 2 * math.pi
+    for u in sampler.random(1 << max(count - 1, 1).bit_length())[: count - 1]:
+        ranges = (limits.frequency_hz, limits.pressure_kpa)
+        frequency, pressure = (float(a + v * (b - a)) for v, (a, b) in zip(u, ranges))
+        # from three quarters of a wave on the body to one and a half
+        lag = wholeturn / (segments + 1) * (0.7 + 0.9 * u[2])
+        phases = lag * np.arange(1, segments + 1) + 0.4 * (u[3:] - 0.5)
+        gaits.append(Wave(frequency, pressure, tuple(phases.tolist()), (0.0,) * segments).gait())
+    return [steered(problem, g) for g in gaits]
+
+
+def steered(problem: CycleProblem, gait: Gait) -> Gait:
+    """Return the gait leaned towards the wanted turn, as far as smoothed friction lets it."""
+    goal = problem.goal
+    robot = replace(problem.robots[0], friction_speed_m_s=_SMOOTHED_M_S)
+    if goal.tightest:
+        return aimed(gait, lambda g: steady_gait(robot, g, problem.model).turn_rate_rad_s - 0.5, 0.1)
+    if goal.radius_m is None and not goal.turn_rate_rad_s:
+        return gait
+    try:
+        return aimed(gait, turn_miss(problem, _SMOOTHED_M_S), 0.05)
+    except NoAnswerError:
+        return gait
+
+
+def turn_miss(problem: CycleProblem, friction_speed_m_s: float = 0.0) -> Callable[[Gait], float]:
+    """Return a function that tells by how much a gait turns further left than wanted, rad/s."""
+    goal: Goal = problem.goal
+    own = problem.robots[0].friction_speed_m_s
+    robot = replace(problem.robots[0], friction_speed_m_s=max(own, friction_speed_m_s))
+
+    def miss(gait: Gait) -> float:
+        orbit = steady_gait(robot, gait, problem.model)
+        wanted = goal.turn_rate_rad_s or 0.0
+        if goal.radius_m is not None:
+            wanted = orbit.speed_m_s / goal.radius_m
+        return orbit.turn_rate_rad_s - wanted
+
+    return miss

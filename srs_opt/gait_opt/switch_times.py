@@ -1,0 +1,113 @@
+"""Exact switch times: multi-phase collocation in a fixed order, orders exchanged where a phase vanishes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from srs_opt.errors import NoAnswerError
+from srs_opt.gait import Gait
+from srs_opt.gait_opt.collocation.explain import explained
+from srs_opt.gait_opt.collocation.guess import gait_from, switches_of, unknowns_from_orbits
+from srs_opt.gait_opt.collocation.phases import element_counts, exchanged, phase_times, switch_order
+from srs_opt.gait_opt.collocation.problem import CycleProblem
+from srs_opt.gait_opt.collocation.refine import defects, refined_counts
+from srs_opt.gait_opt.ladder import Report, Rung, Step, bounded, orbits_of
+from srs_opt.gait_opt.score import Score, score
+from srs_opt.orbit.steady import Orbit
+
+_IPOPT = {"mu_strategy": "monotone", "mu_init": 1e-3, "max_iter": 100}
+_ROUNDS = 4
+_ELEMENTS = 90
+_MOST_ELEMENTS = 160
+_DEFECT = 5e-3  # tolerated between nodes, over the states' sizes
+_GAINED = 1e-5
+_TOLERATED_LOSS = 1e-3
+
+
+@dataclass(frozen=True)
+class Polished:
+    """The result: gait, its orbits and score, the speed that the last good solve claimed, the steps."""
+
+    gait: Gait
+    orbits: tuple[Orbit, ...]
+    score: Score
+    claimed_m_s: float
+    steps: tuple[Step, ...]
+
+
+def optimize_switch_times(
+    problem: CycleProblem, gait: Gait, reach: float = 0.02, report: Report | None = None
+) -> Polished:
+    """Return the gait with locally optimal switch times, frequency and pressure.
+
+    Each round solves one fixed order of switches on one mesh. Switches that met exchange their order for
+    the next round; phases in which the polynomials disobey the equations between nodes get more elements.
+    """
+    orbits = orbits_of(problem, gait)
+    best = score(problem, gait, orbits)
+    claimed = orbits[0].speed_m_s
+    steps: list[Step] = []
+    order = switch_order(_switches(gait))
+    counts = element_counts(_switches(gait), order, _ELEMENTS)
+    for _ in range(_ROUNDS):
+        trial, step, met, finer = _solve(problem, gait, orbits, order, counts, reach)
+        try:
+            trial_orbits = orbits_of(problem, trial)
+        except NoAnswerError:
+            reach /= 3
+            continue
+        found = score(problem, trial, trial_orbits)
+        step = replace(step, simulated_m_s=trial_orbits[0].speed_m_s)
+        steps.append(step)
+        gain = found.total - best.total
+        if not step.trouble and gain > -_TOLERATED_LOSS:
+            claimed = step.speed_m_s
+        if gain > 0:
+            gait, orbits, best = trial, trial_orbits, found
+        if report is not None:
+            report(step, best)
+        if gain <= _GAINED and met is None and (finer == counts).all() and not step.trouble:
+            break
+        counts = finer
+        if gain > 0 and met is not None:
+            order = met
+            counts = element_counts(_switches(gait), order, int(counts.sum()))
+        elif gain <= 0:
+            reach /= 3
+    return Polished(gait, orbits, best, claimed, tuple(steps))
+
+
+def _switches(gait: Gait) -> np.ndarray:
+    return switches_of(gait, gait.intervals[0][0][0])
+
+
+def _solve(
+    problem: CycleProblem,
+    gait: Gait,
+    orbits: tuple[Orbit, ...],
+    order: np.ndarray,
+    counts: np.ndarray,
+    reach: float,
+) -> tuple[Gait, Step, np.ndarray | None, np.ndarray]:
+    """Solve once; return the gait, the step, the exchanged order (if switches met), the refined counts."""
+    own = max(r.friction_speed_m_s for r in problem.robots)
+    mesh, times = phase_times(_switches(gait), order, counts)
+    p = problem.program(mesh.elements, times)
+    z, scales = unknowns_from_orbits(p.layout, list(problem.robots), list(orbits), mesh)
+    z[p.layout.merit] = score(problem, gait, orbits).merit
+    parameters = problem.parameters(p, mesh, scales, own)
+    unknowns, rows, _ = bounded(problem, p, z, reach)
+    solution = p.solve(z, parameters, unknowns, rows, options=_IPOPT)
+    trial = gait_from(p.layout, solution.z)
+    speed = float(solution.z[p.layout.unknown(0, "speed")])
+    defect = defects(p, solution, parameters, mesh)
+    step = Step(
+        Rung(own, mesh.elements, reach), speed, speed, solution.iterations,
+        explained(p, solution, trial), mesh.elements, float(defect.max()),
+    )  # fmt: skip
+    finer = counts
+    if mesh.elements < _MOST_ELEMENTS:
+        finer = refined_counts(defect, counts, _DEFECT)
+    return trial, step, exchanged(solution.z[2 : 2 + p.layout.switches], order), finer

@@ -1,0 +1,162 @@
+"""Gait tables: families of certified gaits that a controller plays and the planner drives with."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from srs_opt.document import Document, load_schema, read_yaml, validate
+from srs_opt.errors import InputError
+from srs_opt.files import write_text
+from srs_opt.gait import Gait
+from srs_opt.orbit.steady import Orbit
+from srs_opt.robot import Robot
+
+VERSION = 1
+
+
+@dataclass(frozen=True)
+class TableGait:
+    """One gait of a table with its steady motion.
+
+    Attributes
+    ----------
+    name : str
+    gait : Gait
+    speed_m_s, turn_rate_rad_s : float
+        Mean speed (negative: the robot backs up) and turn rate (+ left).
+    radius_m : float or None
+        Radius of the mean path, + with the centre on the left; None when straight.
+    envelope_m : (right, left)
+        Reach of the body about the mean path, body width included.
+    displacement : (dx_m, dy_m, turn_rad)
+        Rigid displacement per cycle, in the frame of the pose (centre of mass, mean heading) at its start.
+    friction_work_j : float
+        Per cycle.
+    """
+
+    name: str
+    gait: Gait
+    speed_m_s: float
+    turn_rate_rad_s: float
+    radius_m: float | None
+    envelope_m: tuple[float, float]
+    displacement: tuple[float, float, float]
+    friction_work_j: float
+
+    @staticmethod
+    def of_orbit(name: str, orbit: Orbit) -> TableGait:
+        """Return the entry of a gait whose steady state is known."""
+        dx, dy, turn = (float(v) for v in orbit.motion.displacement)
+        return TableGait(
+            name,
+            orbit.gait,
+            orbit.speed_m_s,
+            orbit.turn_rate_rad_s,
+            orbit.radius_m,
+            orbit.envelope_m,
+            (dx, dy, turn),
+            orbit.work_j,
+        )
+
+
+@dataclass(frozen=True)
+class GaitTable:
+    """Gaits of one robot under one model; `fingerprint` is the robot's."""
+
+    robot_name: str
+    fingerprint: str
+    model: str
+    gaits: tuple[TableGait, ...]
+
+    def __getitem__(self, name: str) -> TableGait:
+        for gait in self.gaits:
+            if gait.name == name:
+                return gait
+        raise KeyError(name)
+
+    def nearest(self, speed_m_s: float, turn_rate_rad_s: float, lever_m: float = 0.1) -> TableGait:
+        """Return the gait nearest to a wanted motion; turn rates weigh `lever_m` against speeds."""
+        motion = np.array([[g.speed_m_s, lever_m * g.turn_rate_rad_s] for g in self.gaits])
+        distance = np.hypot(*(motion - [speed_m_s, lever_m * turn_rate_rad_s]).T)
+        return self.gaits[int(distance.argmin())]
+
+
+def _gait_record(entry: TableGait) -> dict[str, Any]:
+    return {
+        "name": entry.name,
+        "period_s": entry.gait.period_s,
+        "pressure_kpa": entry.gait.pressure_kpa,
+        "intervals": [[list(pair) for pair in pairs] for pairs in entry.gait.intervals],
+        "speed_m_s": entry.speed_m_s,
+        "turn_rate_rad_s": entry.turn_rate_rad_s,
+        "radius_m": entry.radius_m,
+        "envelope_m": list(entry.envelope_m),
+        "displacement": list(entry.displacement),
+        "friction_work_j": entry.friction_work_j,
+    }
+
+
+def save_table(table: GaitTable, path: Path | str) -> Path:
+    """Write a gait table as JSON (schema: gait_table.schema.json)."""
+    record = {
+        "version": VERSION,
+        "robot": table.robot_name,
+        "fingerprint": table.fingerprint,
+        "model": table.model,
+        "gaits": [_gait_record(g) for g in table.gaits],
+    }
+    return write_text(path, json.dumps(record, indent=1, allow_nan=False) + "\n")
+
+
+def load_table(path: Path | str, robot: Robot | None = None) -> GaitTable:
+    """Read a gait table; with `robot`, refuse a table that was built for another one.
+
+    Raises
+    ------
+    InputError
+        For a wrong version, a foreign robot, or any gait that is not valid.
+    """
+    document = read_yaml(path, "a gait table (JSON)")
+    record = document.value
+    if isinstance(record, dict) and record.get("version", VERSION) != VERSION:
+        raise document.error(
+            ("version",), f"this program reads version {VERSION}, found {record['version']!r}"
+        )
+    validate(document, load_schema("srs_opt.gait_opt", "gait_table.schema.json"))
+    table = GaitTable(record["robot"], record["fingerprint"], record["model"], _entries(document))
+    if robot is not None and table.fingerprint != robot.fingerprint():
+        raise InputError(
+            f"{path}: table was built for robot '{table.robot_name}' ({table.fingerprint}), not for "
+            f"'{robot.name}' ({robot.fingerprint()}); rebuild it: python -m srs_opt.gait_opt --table"
+        )
+    return table
+
+
+def _entries(document: Document) -> tuple[TableGait, ...]:
+    entries = []
+    for index, g in enumerate(document.value["gaits"]):
+        try:
+            intervals = tuple(tuple((float(a), float(b)) for a, b in pairs) for pairs in g["intervals"])
+            gait = Gait(float(g["period_s"]), float(g["pressure_kpa"]), intervals)
+        except InputError as error:
+            raise document.error(("gaits", index), str(error)) from error
+        right, left = g["envelope_m"]
+        dx, dy, turn = g["displacement"]
+        entries.append(
+            TableGait(
+                g["name"],
+                gait,
+                g["speed_m_s"],
+                g["turn_rate_rad_s"],
+                g["radius_m"],
+                (right, left),
+                (dx, dy, turn),
+                g["friction_work_j"],
+            )
+        )
+    return tuple(entries)
