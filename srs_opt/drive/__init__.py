@@ -1,0 +1,1 @@
+"""The snake as a differential drive: reachable motions, their gaits, calibration against measurements."""

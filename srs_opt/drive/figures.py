@@ -1,0 +1,33 @@
+"""Picture of the reachable motions: the differential drive at a glance."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import shapely
+
+from srs_opt.drive.drive import Drive, DriveGait
+from srs_opt.figures import COLOURS, new_figure, save_figure, styled
+
+
+@styled
+def draw_reachable(drive: Drive, stem: Path, chosen: DriveGait | None = None) -> tuple[Path, Path]:
+    """Draw the reachable set of speed and turn rate, forward and reverse; return the files."""
+    figure, axes = new_figure(width_in=3.5, height_in=2.8)
+    reachable = drive.reachable()
+    parts = shapely.get_parts(reachable)
+    for sign, colour, label in ((1, COLOURS[0], "forward"), (-1, COLOURS[1], "reverse")):
+        for k, part in enumerate(parts):
+            x, y = np.asarray(part.exterior.coords).T
+            axes.fill(sign * x, y, color=colour, alpha=0.35, linewidth=0, label=label if k == 0 else None)
+    grid = drive.corners[:, :, 4:6].reshape(-1, 2)
+    axes.plot(grid[:, 0], grid[:, 1], ".", color=COLOURS[6], markersize=1.5, label="gaits of the map")
+    if chosen is not None:
+        axes.plot(
+            chosen.speed_m_s, chosen.turn_rate_rad_s, "*", color=COLOURS[2], markersize=9, label="chosen"
+        )
+    axes.set_xlabel("speed (m/s), + forward")
+    axes.set_ylabel("turn rate (rad/s), + left")
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, 1.18), ncols=2)
+    return save_figure(figure, stem)
