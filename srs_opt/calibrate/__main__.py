@@ -1,0 +1,89 @@
+"""Command: fit the robot's parameters to a measured data set."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from srs_opt.command import Answer, Parser, make_parser, positive_int, run_command, say
+
+if TYPE_CHECKING:
+    from srs_opt.calibrate.result import Calibration
+
+
+def build_parser() -> Parser:
+    """Return the command's parser."""
+    parser = make_parser(
+        "python -m srs_opt.calibrate",
+        "Fit friction, curvature per pressure and time constants to all trials of a data set at once, bench\n"
+        "values as priors; write robot.yaml with estimates and relative standard deviations.\n"
+        "JSON: parameters and sd (SI units, pressure in kPa), unidentifiable (directions the data say\n"
+        "nothing about), misfit {before, after} (root mean square over the noise).",
+        "python -m srs_opt.calibrate data/my_set --json",
+        robot=False,
+    )
+    parser.add_argument("dataset", type=Path, metavar="DATASET", help="folder of the data set")
+    parser.add_argument(
+        "--robot", type=Path, metavar="FILE", help="robot file to start from (default: the data set's own)"
+    )
+    parser.add_argument("--model", choices=("complex", "simplified"), default="complex", help="dynamic model")
+    parser.add_argument(
+        "--jobs",
+        type=positive_int,
+        default=2,
+        metavar="N",
+        help="processes (default 2; same answer)",
+    )
+    return parser
+
+
+def run(options: argparse.Namespace) -> Answer:
+    """Calibrate and write robot.yaml."""
+    from dataclasses import replace
+
+    from srs_opt.calibrate.run import calibrate
+    from srs_opt.measurement.dataset import load_dataset
+    from srs_opt.robot import load_robot, save_robot
+
+    dataset = load_dataset(options.dataset)
+    if options.robot is not None:
+        dataset = replace(dataset, robot=load_robot(options.robot))
+    found = calibrate(dataset, options.model, lambda message: say(options, message), options.jobs)
+    path = save_robot(found.robot, options.out / "robot.yaml")
+    return Answer(_record(found), _summary(found), files=(path,))
+
+
+def _record(found: Calibration) -> dict[str, object]:
+    names = list(found.parameters)
+    return {
+        "parameters": found.parameters,
+        "sd": found.sd,
+        "unidentifiable": list(found.unidentifiable),
+        "misfit": {"before": found.before, "after": found.after},
+        "correlation": {
+            a: {b: round(float(found.correlation[i, j]), 4) for j, b in enumerate(names)}
+            for i, a in enumerate(names)
+        },
+        "robot": found.robot.to_record(),
+    }
+
+
+def _summary(found: Calibration) -> str:
+    lines = [f"{name:34s} {value:.6g} +- {found.sd[name]:.2g}" for name, value in found.parameters.items()]
+    lines.append(f"misfit over noise: {found.before:.3f} -> {found.after:.3f}")
+    if found.unidentifiable:
+        lines.append("the data say nothing about: " + "; ".join(found.unidentifiable))
+    if found.after > 1.1:
+        lines.append("the model does not explain the data: see python -m srs_opt.discrepancy")
+    return "\n".join(lines)
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the command; return its exit status."""
+    return run_command(build_parser(), run, argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,117 @@
+"""Several processes, each with its own fixed share of the trials, so that results never depend on timing."""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Sequence
+from multiprocessing.connection import Connection
+from typing import TYPE_CHECKING, Any
+
+from srs_opt.calibrate.coordinates import Coordinate
+from srs_opt.calibrate.gram import TrialGram
+from srs_opt.errors import NoAnswerError
+from srs_opt.measurement.records import Trial
+from srs_opt.processes import workers_deaf_to_interrupts
+
+if TYPE_CHECKING:
+    from srs_opt.calibrate.fit import Experiment, Extra, Point
+
+
+class Crew:
+    """Worker processes that linearise trials; a context manager.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        Its model, trials and noise go to the workers.
+    jobs : int
+        Number of processes, the calling one included.
+    """
+
+    def __init__(self, experiment: Experiment, jobs: int) -> None:
+        self.experiment = experiment
+        order = sorted(experiment.trials, key=lambda t: -t.time_s[-1] * max(t.frequency_hz, 0.5))
+        shares = [order[k::jobs] for k in range(jobs)]
+        self.own = {t.name for t in shares[0]}
+        self._members: list[tuple[Any, Connection, set[str]]] = []
+        context = multiprocessing.get_context("spawn")
+        for share in shares[1:]:
+            if share:
+                here, there = context.Pipe()
+                setup = (experiment.model.robot, experiment.model.full.model, share, experiment.sd_m)
+                process = context.Process(target=_serve, args=(there, *setup), daemon=True)
+                with workers_deaf_to_interrupts():
+                    process.start()
+                there.close()
+                self._members.append((process, here, {t.name for t in share}))
+
+    def __enter__(self) -> Crew:
+        self.experiment.crew = self
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.experiment.crew = None
+        for process, connection, _ in self._members:
+            try:
+                connection.send(None)
+            except OSError:
+                process.terminate()
+            if error[0] is not None:  # nobody waits for the work in hand
+                process.terminate()
+            process.join(timeout=10)
+            connection.close()
+
+    def grams(
+        self, trials: Sequence[Trial], point: Point, coordinates: Sequence[Coordinate], extra: Extra | None
+    ) -> dict[str, TrialGram]:
+        """Return the Gram matrices of `trials`, every process working on its share.
+
+        Raises
+        ------
+        NoAnswerError
+            If a trial cannot be simulated at `point`.
+        """
+        asked = []
+        for _, connection, share in self._members:
+            names = [t.name for t in trials if t.name in share]
+            if names:
+                connection.send((names, point, tuple(coordinates), extra))
+                asked.append(connection)
+        found: dict[str, TrialGram] = {}
+        failure: NoAnswerError | None = None
+        try:
+            for t in trials:
+                if t.name in self.own:
+                    found[t.name] = self.experiment.gram(t, point, coordinates, extra)
+        except NoAnswerError as error:
+            failure = error
+        for connection in asked:
+            reply = connection.recv()
+            if isinstance(reply, dict):
+                found.update(reply)
+            else:
+                failure = NoAnswerError(reply)
+        if failure is not None:
+            raise failure
+        return {t.name: found[t.name] for t in trials}
+
+
+def _serve(connection: Connection, robot: Any, model: str, trials: list[Trial], sd_m: float) -> None:
+    """Answer requests until told to stop."""
+    from srs_opt.calibrate.fit import Experiment
+    from srs_opt.calibrate.model import Model
+
+    experiment = Experiment(Model(robot, model), trials, sd_m)
+    known = {t.name: t for t in trials}
+    while True:
+        try:
+            request = connection.recv()
+        except (EOFError, KeyboardInterrupt):
+            return
+        if request is None:
+            return
+        names, point, coordinates, extra = request
+        try:
+            connection.send({n: experiment.gram(known[n], point, coordinates, extra) for n in names})
+        except NoAnswerError as error:
+            connection.send(str(error))

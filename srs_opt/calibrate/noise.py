@@ -1,0 +1,35 @@
+"""The markers' noise from the tracks themselves: fourth differences leave noise and hardly any motion."""
+
+from __future__ import annotations
+
+from math import comb
+
+import numpy as np
+
+from srs_opt.measurement.records import DataSet, Trial
+
+ORDER = 4
+_LEAST = 50  # differences that an estimate needs
+_MAD = 0.674489750196  # median |x| of a unit normal
+
+
+def track_of(trial: Trial) -> np.ndarray | None:
+    """Return the trial's measured coordinates, (T, 2 M), NaN where lost."""
+    points = trial.markers_m if trial.markers_m is not None else trial.centre_m
+    return None if points is None else points.reshape(len(trial.time_s), -1)
+
+
+def noise_sd_m(dataset: DataSet) -> float:
+    """Return the noise per coordinate, robustly; what the data set states when there are too few frames."""
+    found = []
+    for trial in dataset.trials:
+        track = track_of(trial)
+        if track is not None and track.shape[0] > ORDER:
+            differences = np.diff(track, ORDER, axis=0).ravel()
+            found.append(differences[np.isfinite(differences)])
+    pooled = np.concatenate(found) if found else np.zeros(0)
+    if pooled.size < _LEAST:
+        return dataset.marker_sd_m
+    gain = np.sqrt(comb(2 * ORDER, ORDER))
+    sd = float(np.median(np.abs(pooled)) / _MAD / gain)
+    return sd if sd > 0 else dataset.marker_sd_m

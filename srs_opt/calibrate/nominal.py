@@ -1,0 +1,230 @@
+"""Simulate one trial on an adapted mesh: the states at the mesh's nodes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from srs_opt.calibrate.model import Conditions, Model, Values
+from srs_opt.calibrate.start import start_pose
+from srs_opt.errors import NoAnswerError
+from srs_opt.gait import Gait, Wave
+from srs_opt.measurement.records import Schedule, Trial
+from srs_opt.simulate.buffered import buffered
+from srs_opt.simulate.integrate import BLOCK, block_function
+from srs_opt.simulate.mesh import Mesh
+from srs_opt.simulate.rosenbrock import BODY_STATES
+from srs_opt.simulate.timeline import Timeline
+
+STEP_S = 0.005
+# local error of the body's speed per step; 5e-6 keeps the track within about 0.01 mm, well below what a
+# few thousand frames of 1 mm markers can see
+TOLERANCE_M_S = 5e-6
+ACCEPTED = 15.0  # single steps may be worse: friction forgets an error of speed within milliseconds
+ATTEMPTS = 4
+_TAIL_S = 0.05  # simulated beyond the last label, for clocks that run late
+
+
+@dataclass(frozen=True)
+class Nodes:
+    """States at the nodes of one trial's mesh.
+
+    Attributes
+    ----------
+    time_s : array (n + 1,)
+    body : array (n + 1, 6)
+        Pose, then velocity in the robot's frame and yaw momentum.
+    kappa, dkappa, memory : array (n + 1, N-1)
+        Memory is the hysteresis variable z, also where no hysteresis acts.
+    valve : array (n, N-1)
+        Held over each step.
+    p : array
+        Packed parameters of the full structure.
+    """
+
+    time_s: np.ndarray
+    body: np.ndarray
+    kappa: np.ndarray
+    dkappa: np.ndarray
+    memory: np.ndarray
+    valve: np.ndarray
+    p: np.ndarray
+
+
+def timeline_of(trial: Trial, segments: int) -> Timeline:
+    """Return what the valves do in a trial, a little longer than it was recorded."""
+    end = float(trial.time_s[-1]) + _TAIL_S
+    if trial.kind == "still":
+        return Timeline.vent(segments, end, trial.pressure_kpa)
+    if trial.schedule is not None:
+        return _scheduled(trial.schedule, segments, end, trial)
+    wave = Wave.uniform(segments, trial.frequency_hz, trial.pressure_kpa, trial.phase_lag_rad, trial.offset)
+    return Timeline.of_gait(wave.gait(), end)
+
+
+def _scheduled(schedule: Schedule, segments: int, end_s: float, trial: Trial) -> Timeline:
+    """Play a schedule; a segment that it does not name stays vented."""
+    named = {segment for segment, _, _ in schedule.intervals}
+    period = schedule.period_s
+    inner = {t % period for _, on, off in schedule.intervals for t in (on, off)}
+    cycle = np.array(sorted({0.0, *inner}))
+    starts = (np.arange(math.ceil(end_s / period))[:, None] * period + cycle).ravel()
+    starts = starts[starts < end_s - 1e-9]
+    durations = np.diff(np.append(starts, end_s))
+    middles = starts + durations / 2
+    valve = np.stack(
+        [schedule.state(i, middles) if i in named else np.zeros(middles.size) for i in range(1, segments + 1)]
+    )
+    frequency = trial.frequency_hz if trial.frequency_hz > 0 else 1 / period
+    return Timeline.constant(durations, valve, trial.pressure_kpa, frequency)
+
+
+def conditions_of(trial: Trial) -> Conditions:
+    """Return the trial's conditions as the equations see them."""
+    return Conditions(trial.pressure_kpa, trial.frequency_hz or 1.0, trial.tether)
+
+
+class TrialRun:
+    """One trial, ready to be simulated at any values; keeps the last mesh as a start for the next."""
+
+    def __init__(self, model: Model, trial: Trial) -> None:
+        self.model, self.trial = model, trial
+        self.conditions = conditions_of(trial)
+        self.timeline = timeline_of(trial, model.segments)
+        self._meshes: dict[tuple[float, int], tuple[tuple[float, ...], Mesh]] = {}
+
+    def __call__(self, values: Values, tolerance_m_s: float = TOLERANCE_M_S) -> Nodes:
+        """Simulate the trial, with a local error of `tolerance_m_s` in the body's speed.
+
+        Raises
+        ------
+        NoAnswerError
+            If the motion stops being finite.
+        """
+        structure, kept = self.model.structure(values)
+        p = self.model.pack(values, self.conditions)
+        delay = values.get("dead_time.delay_s", 0.0) + self.model.robot.valve_delay_s
+        timeline = self.timeline.delayed(delay)
+        x = self._start(p, structure.segments, nonlinear=structure == self.model.full)
+        states, valves, steps = [x[:, None]], [], []
+        block = block_function(structure)
+        for number, piece in enumerate(_cycles(timeline, self.trial.period_s)):
+            new, mesh = self._piece((tolerance_m_s, number), block, x, piece, p[kept])
+            x = new[:, -1]
+            states.append(new)
+            valves.append(piece.valve[:, mesh.phase])
+            steps.append(mesh.h_s)
+        return _nodes(
+            np.concatenate(states, axis=1), np.concatenate(valves, axis=1), np.concatenate(steps), p
+        )
+
+    def _start(self, p: np.ndarray, segments: int, *, nonlinear: bool) -> np.ndarray:
+        x = np.zeros(BODY_STATES + segments * (3 if nonlinear else 2))
+        x[:3] = start_pose(self.model.full, p, self.trial.heading_rad)[0]
+        return x
+
+    def _piece(
+        self, key: tuple[float, int], block: ca.Function, x: np.ndarray, piece: Timeline, p: np.ndarray
+    ) -> tuple[np.ndarray, Mesh]:
+        """Integrate one cycle on the mesh that served it last time, refined where that is too coarse."""
+        phases = (*np.round(piece.duration_s, 7), *piece.valve.ravel())
+        tolerance, number = key
+        kept = self._meshes.get(key) or self._meshes.get((tolerance, number - 1))
+        mesh = _fitted(kept, piece.duration_s, phases) or Mesh.uniform(piece.duration_s, STEP_S)
+        for attempt in range(ATTEMPTS):
+            states, errors = _steps(block, x, mesh, piece.valve, p)
+            if errors.max() <= ACCEPTED * tolerance or attempt == ATTEMPTS - 1:
+                break
+            mesh = mesh.refined(errors, tolerance)
+        self._meshes[key] = (phases, mesh)
+        return states, mesh
+
+
+def _fitted(
+    kept: tuple[tuple[float, ...], Mesh] | None, duration_s: np.ndarray, phases: tuple[float, ...]
+) -> Mesh | None:
+    """Return a kept mesh when it belongs to the same valve pattern, stretched to the phases' durations."""
+    if kept is None or len(kept[0]) != len(phases):
+        return None
+    count = duration_s.size
+    if kept[0][count:] != phases[count:]:
+        return None
+    mesh = kept[1]
+    stretch = duration_s / np.bincount(mesh.phase, mesh.h_s, minlength=count)
+    return Mesh(mesh.h_s * stretch[mesh.phase], mesh.phase)
+
+
+def _steps(
+    block: ca.Function, x: np.ndarray, mesh: Mesh, valve: np.ndarray, p: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    call = buffered(block)
+    state, valves, h, parameters = call.arguments
+    state[0], parameters[0] = x, p
+    n = mesh.h_s.size
+    held = valve.T[mesh.phase]
+    states, errors = np.empty((n, x.size)), np.empty(n)
+    for k in range(0, n, BLOCK):
+        count = min(BLOCK, n - k)
+        valves[:count], h[:count, 0], h[count:] = held[k : k + count], mesh.h_s[k : k + count], 0.0
+        call.evaluate()
+        new, error = call.results
+        states[k : k + count], errors[k : k + count] = new[:count], error[:count, 0]
+        state[0] = new[count - 1]
+    result = states.T
+    if not np.isfinite(result[:, -1]).all():
+        raise NoAnswerError("the simulated motion of a trial stops being finite; effect sizes out of range")
+    return result, errors
+
+
+def _cycles(timeline: Timeline, period_s: float) -> list[Timeline]:
+    """Cut a timeline at whole periods, so that cycles share meshes."""
+    ends = np.cumsum(timeline.duration_s)
+    pieces, start = [], 0
+    boundary = period_s
+    for k, end in enumerate(ends):
+        if end >= boundary - 1e-9 or k - start >= 60 or k == ends.size - 1:
+            cut = slice(start, k + 1)
+            pieces.append(
+                Timeline(
+                    timeline.duration_s[cut],
+                    timeline.valve[:, cut],
+                    timeline.pressure_kpa[cut],
+                    timeline.frequency_hz[cut],
+                )
+            )
+            start = k + 1
+            boundary = (math.floor((end + 1e-9) / period_s) + 1) * period_s
+    return pieces
+
+
+def _nodes(states: np.ndarray, valve: np.ndarray, h_s: np.ndarray, p: np.ndarray) -> Nodes:
+    segments = valve.shape[0]
+    act = states[BODY_STATES:].T
+    kappa, dkappa = act[:, :segments], act[:, segments : 2 * segments]
+    return Nodes(
+        time_s=np.concatenate([[0.0], np.cumsum(h_s)]),
+        body=states[:6].T,
+        kappa=kappa,
+        dkappa=dkappa,
+        memory=act[:, 2 * segments :],
+        valve=valve.T,
+        p=p,
+    )
+
+
+def with_memory(nodes: Nodes, width: float) -> np.ndarray:
+    """Return the hysteresis variable z along the nodes (closed form while a curvature moves one way)."""
+    if nodes.memory.shape[1]:
+        return nodes.memory
+    z = np.zeros_like(nodes.kappa)
+    change = np.diff(nodes.kappa, axis=0)
+    goal, stay = np.sign(change) * width, np.exp(-np.abs(change) / width)
+    for k in range(change.shape[0]):
+        z[k + 1] = goal[k] + (z[k] - goal[k]) * stay[k]
+    return z
+
+
+__all__ = ["Gait", "Nodes", "TrialRun", "conditions_of", "timeline_of", "with_memory"]

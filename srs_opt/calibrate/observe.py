@@ -1,0 +1,185 @@
+"""What the camera sees of a simulated trial, and its derivatives by the fit's coordinates."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import casadi as ca
+import numpy as np
+
+from srs_opt.calibrate.coordinates import Coordinate
+from srs_opt.calibrate.model import CAMERA, Model, Values
+from srs_opt.calibrate.nominal import Nodes
+from srs_opt.calibrate.sensitivity import evaluate, mapped, variation
+from srs_opt.measurement.records import Trial
+from srs_opt.model.effects import all_effects
+from srs_opt.model.parameters import Structure
+from srs_opt.model.registry import build
+from srs_opt.simulate.compiled import compiled
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Predicted picture coordinates of one trial.
+
+    Attributes
+    ----------
+    points : array (T, 2 M)
+        x1, y1, x2, y2 ... per frame.
+    slopes : array (T, 2 M, K)
+        Derivatives by the coordinates asked for.
+    pose, kappa : array (T, 3), (T, N-1)
+        Motion at the frames.
+    """
+
+    points: np.ndarray
+    slopes: np.ndarray
+    pose: np.ndarray
+    kappa: np.ndarray
+
+
+@lru_cache(maxsize=8)
+def _picture(structure: Structure, centre_only: bool) -> ca.Function:
+    """Return ``(pose, kappa, camera (4), p) -> (points, by pose, by kappa, by camera, by p)``, mapped."""
+
+    def make() -> ca.Function:
+        parameters, m, _ = build(structure)
+        pose, camera = ca.SX.sym("pose", 3), ca.SX.sym("camera", len(CAMERA))
+        c, s = ca.cos(pose[2]), ca.sin(pose[2])
+        x = pose[0] + c * m.chain.x - s * m.chain.y
+        y = pose[1] + s * m.chain.x + c * m.chain.y
+        values = {name: camera[i] for i, name in enumerate(CAMERA)}
+        x, y = _seen(x, y, pose[2] + m.chain.angle, values, m.mass if centre_only else None)
+        points = ca.vec(ca.horzcat(x, y).T)
+        p = parameters.vector
+        by = [ca.densify(ca.jacobian(points, v)) for v in (pose, m.kappa, camera, p)]
+        outputs = [points, *(ca.reshape(o, -1, 1) for o in by)]
+        single = ca.Function("picture", [pose, m.kappa, camera, p], outputs, {"cse": True})
+        return mapped(single, (2, 3))
+
+    return compiled(f"picture {centre_only} {structure}", make)
+
+
+def _seen(
+    x: ca.SX, y: ca.SX, angle: ca.SX, values: dict[str, ca.SX], mass: ca.SX | None
+) -> tuple[ca.SX, ca.SX]:
+    """Apply marker offsets, the mean over the body where only that is recorded, then the camera's errors."""
+    hooks = [(e, _own(name, values)) for name, e in all_effects().items() if e.marker or e.camera]
+    for effect, own in hooks:
+        if effect.marker:
+            x, y = effect.marker(own, x, y, angle)
+    if mass is not None:
+        x, y = (ca.dot(mass, v) / ca.sum1(mass) for v in (x, y))
+    for effect, own in hooks:
+        if effect.camera:
+            x, y = effect.camera(own, x, y)
+    return x, y
+
+
+def _own(effect: str, values: dict[str, ca.SX]) -> dict[str, ca.SX]:
+    return {name.split(".")[1]: v for name, v in values.items() if name.startswith(effect + ".")}
+
+
+def _hermite(time_s: np.ndarray, value: np.ndarray, rate: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Interpolate cubically with known slopes; before the start everything stands still."""
+    k = np.clip(np.searchsorted(time_s, at, side="right") - 1, 0, time_s.size - 2)
+    h = (time_s[k + 1] - time_s[k])[:, None]
+    u = np.clip((at - time_s[k])[:, None] / h, 0.0, 1.0)
+    w = 1 - u
+    left = w * w * ((1 + 2 * u) * value[k] + u * h * rate[k])
+    right = u * u * ((1 + 2 * w) * value[k + 1] - w * h * rate[k + 1])
+    return np.asarray(left + right)
+
+
+def _linear(time_s: np.ndarray, value: np.ndarray, at: np.ndarray) -> np.ndarray:
+    k = np.clip(np.searchsorted(time_s, at, side="right") - 1, 0, time_s.size - 2)
+    u = np.clip((at - time_s[k]) / (time_s[k + 1] - time_s[k]), 0.0, 1.0)
+    u = u.reshape(-1, *[1] * (value.ndim - 1))
+    return np.asarray((1 - u) * value[k] + u * value[k + 1])
+
+
+def predict(
+    model: Model,
+    trial: Trial,
+    nodes: Nodes,
+    values: Values,
+    coordinates: Sequence[Coordinate] = (),
+    *,
+    centre_only: bool = False,
+) -> Prediction:
+    """Return what the camera sees at the trial's labels, with derivatives by `coordinates`.
+
+    Parameters
+    ----------
+    nodes : Nodes
+        The trial simulated at `values`.
+    """
+    at = trial.time_s + values.get("clock_offset.offset_s", 0.0)
+    camera = np.array([values.get(name, 0.0) for name in CAMERA])
+    rate = _pose_rate(model, nodes)
+    pose = _hermite(nodes.time_s, nodes.body[:, :3], rate, at)
+    kappa = _hermite(nodes.time_s, nodes.kappa, nodes.dkappa, at)
+    function = _picture(model.full, centre_only)
+    points, by_pose, by_kappa, by_camera, by_p = evaluate(function, (pose, kappa), camera, nodes.p)
+    frames, seen = points.shape
+    slopes = np.zeros((frames, seen, len(coordinates)))
+    if not coordinates:
+        return Prediction(points, slopes, pose, kappa)
+    seeds = model.seeds(values, _conditions(trial), coordinates)
+    width = float(np.exp(values.get("hysteresis.log_width", np.log(4.0))))
+    moving = np.flatnonzero(np.any(seeds != 0, axis=0))
+    jac_pose = by_pose.reshape(frames, 3, seen).transpose(0, 2, 1)
+    jac_kappa = by_kappa.reshape(frames, -1, seen).transpose(0, 2, 1)
+    if moving.size:
+        varied = variation(model.full, nodes, seeds[:, moving], trial.heading_rad, width)
+        part = jac_pose @ _linear(nodes.time_s, varied.pose, at)
+        part += jac_kappa @ _linear(nodes.time_s, varied.kappa, at)
+        jac_p = by_p.reshape(frames, -1, seen).transpose(0, 2, 1)
+        touched = np.any(seeds != 0, axis=1) & np.any(by_p.reshape(frames, -1, seen) != 0, axis=(0, 2))
+        part += jac_p[:, :, touched] @ seeds[touched][:, moving]
+        slopes[:, :, moving] = part
+    jac_camera = by_camera.reshape(frames, -1, seen).transpose(0, 2, 1)
+    velocity = _velocity(nodes, rate, at)
+    in_time = (jac_pose @ velocity[0][..., None] + jac_kappa @ velocity[1][..., None])[..., 0]
+    for k, coordinate in enumerate(coordinates):
+        if coordinate.name in CAMERA:
+            slopes[:, :, k] = jac_camera[:, :, CAMERA.index(coordinate.name)]
+        elif coordinate.name == "clock_offset.offset_s":
+            slopes[:, :, k] = in_time
+        elif coordinate.name == "dead_time.delay_s":
+            slopes[:, :, k] = -in_time
+    return Prediction(points, slopes, pose, kappa)
+
+
+def _conditions(trial: Trial):  # type: ignore[no-untyped-def]
+    from srs_opt.calibrate.nominal import conditions_of
+
+    return conditions_of(trial)
+
+
+@lru_cache(maxsize=8)
+def _pose_rate_function(structure: Structure) -> ca.Function:
+    def make() -> ca.Function:
+        parameters, m, _ = build(structure)
+        body = ca.SX.sym("body", 6)
+        rate = m.pose_rate(body[:3], body[3:])
+        single = ca.Function("rate", [body, m.kappa, m.dkappa, parameters.vector], [rate], {"cse": True})
+        return mapped(single, (3,))
+
+    return compiled(f"pose rate {structure}", make)
+
+
+def _pose_rate(model: Model, nodes: Nodes) -> np.ndarray:
+    function = _pose_rate_function(model.full)
+    return evaluate(function, (nodes.body, nodes.kappa, nodes.dkappa), nodes.p)[0]
+
+
+def _velocity(nodes: Nodes, rate: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the rates of pose and curvature at the frames; none before the start."""
+    moving = (at >= 0)[:, None]
+    return (
+        np.asarray(_linear(nodes.time_s, rate, at) * moving),
+        np.asarray(_linear(nodes.time_s, nodes.dkappa, at) * moving),
+    )

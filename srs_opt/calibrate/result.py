@@ -1,0 +1,91 @@
+"""What a calibration found: the robot with error bars, correlations, and what the data could not tell."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from srs_opt.calibrate.coordinates import FRICTION_SPEED, Coordinate
+from srs_opt.calibrate.fit import Fit
+from srs_opt.robot import Robot
+
+BLIND = 0.9  # posterior over prior deviation above which the data told nothing
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """A calibrated robot.
+
+    Attributes
+    ----------
+    robot : Robot
+        With calibrated values, their relative_sd and sources.
+    parameters, sd : dict
+        Estimates and standard deviations, in the parameters' units.
+    correlation : array (K, K)
+        Of the parameters, in their order.
+    unidentifiable : tuple of str
+        Directions about which the data say no more than the bench did.
+    before, after : float
+        Root mean square misfit over the noise, at the bench values and at the estimates.
+    """
+
+    robot: Robot
+    parameters: dict[str, float]
+    sd: dict[str, float]
+    correlation: np.ndarray
+    unidentifiable: tuple[str, ...]
+    before: float
+    after: float
+
+
+def calibrated_robot(robot: Robot, fit: Fit) -> Robot:
+    """Return `robot` with the fit's values; v_s, a nuisance of the fit, keeps the robot's value."""
+    changes, deviations, sources = {}, dict(robot.relative_sd), dict(robot.sources)
+    for coordinate in fit.coordinates:
+        if not coordinate.effect and coordinate.name != FRICTION_SPEED:
+            name = coordinate.name
+            changes[name] = getattr(robot, name) * math.exp(fit.point.values[name])
+            deviations[name] = fit.sd[name]
+            sources[name] = "calibrated"
+    return robot.with_values(**changes, relative_sd=deviations, sources=sources)
+
+
+def calibration(robot: Robot, fit: Fit, before: float, after: float) -> Calibration:
+    """Return the calibration behind a fit of the base coordinates."""
+    corrected = calibrated_robot(robot, fit)
+    names = [c.name for c in fit.coordinates if c.name != FRICTION_SPEED]
+    index = [i for i, c in enumerate(fit.coordinates) if c.name != FRICTION_SPEED]
+    values = {n: float(getattr(corrected, n)) for n in names}
+    sds = {n: values[n] * fit.sd[n] for n in names}
+    covariance = fit.covariance[np.ix_(index, index)]
+    size = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    return Calibration(
+        corrected,
+        values,
+        sds,
+        covariance / size[:, None] / size,
+        unidentifiable([fit.coordinates[i] for i in index], covariance),
+        before,
+        after,
+    )
+
+
+def unidentifiable(coordinates: list[Coordinate], covariance: np.ndarray) -> tuple[str, ...]:
+    """Return the directions whose posterior deviation is no smaller than BLIND times their prior's.
+
+    Directions are the eigenvectors of the posterior covariance in units of the priors.
+    """
+    prior = np.array([c.prior_sd for c in coordinates])
+    values, vectors = np.linalg.eigh(covariance / prior[:, None] / prior)
+    found = []
+    for value, vector in zip(values, vectors.T):
+        if math.sqrt(max(value, 0.0)) >= BLIND:
+            parts = [(abs(w), w, c.name) for w, c in zip(vector, coordinates) if abs(w) > 0.3]
+            parts.sort(reverse=True)
+            sign = math.copysign(1.0, parts[0][1])
+            words = [name if w * sign > 0 else f"1/{name}" for _, w, name in parts]
+            found.append(" * ".join(words))
+    return tuple(found)

@@ -1,0 +1,53 @@
+"""Calibrate a robot against a data set."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from contextlib import nullcontext
+
+from srs_opt.calibrate.coordinates import base_coordinates
+from srs_opt.calibrate.crew import Crew
+from srs_opt.calibrate.fit import Experiment, fit, start_point
+from srs_opt.calibrate.maps import fit_maps
+from srs_opt.calibrate.model import Model
+from srs_opt.calibrate.noise import noise_sd_m
+from srs_opt.calibrate.result import Calibration, calibration
+from srs_opt.errors import InputError
+from srs_opt.measurement.records import DataSet
+
+
+def calibrate(
+    dataset: DataSet,
+    model: str = "complex",
+    report: Callable[[str], None] | None = None,
+    jobs: int = 1,
+) -> Calibration:
+    """Fit the robot's parameters to all usable trials, or to the maps where there are no tracks.
+
+    Raises
+    ------
+    InputError
+        If the set holds nothing to calibrate on.
+    NoAnswerError
+        If the robot cannot be simulated under the trials' conditions.
+    """
+    from srs_opt.calibrate.usable import usable
+
+    tell = report or (lambda message: None)
+    trials = [t for t in dataset.trials if not usable(t)]
+    for t in dataset.trials:
+        if usable(t):
+            tell(f"trial {t.name} left out: {usable(t)}")
+    if not trials:
+        if not dataset.maps:
+            raise InputError(f"data set '{dataset.name}': no usable trial and no map to calibrate on")
+        return fit_maps(dataset, model)
+    base = base_coordinates(dataset.robot)
+    experiment = Experiment(Model(dataset.robot, model), trials, noise_sd_m(dataset), dataset.bench)
+    start = start_point(base)
+    with Crew(experiment, jobs) if jobs > 1 else nullcontext():
+        grams = experiment.grams(start, base).values()
+        found = fit(experiment, base, start, report=tell)
+    before = math.sqrt(sum(g.misfit for g in grams) / sum(g.count for g in grams))
+    return calibration(dataset.robot, found, before, math.sqrt(found.misfit_ratio))

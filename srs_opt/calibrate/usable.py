@@ -1,0 +1,26 @@
+"""Which trials a fit can use, and why not the others."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from srs_opt.calibrate.noise import track_of
+from srs_opt.measurement.records import Trial
+
+_PASSIVE = ("tow", "push")  # somebody's hand moves the robot: not simulated
+_LEAST_FRAMES, _LEAST_SEEN = 20, 0.3
+
+
+def usable(trial: Trial) -> str:
+    """Return why a trial cannot be used; empty when it can."""
+    track = track_of(trial)
+    if trial.kind in _PASSIVE:
+        return f"kind '{trial.kind}' is not driven by the valves"
+    if track is None or track.shape[0] < _LEAST_FRAMES:
+        return "too few frames"
+    seen = float(np.isfinite(track).mean())
+    if seen < _LEAST_SEEN:
+        return f"only {seen:.0%} of the markers were seen"
+    if not np.all(np.diff(trial.time_s) > 0):
+        return "its clock does not run forward"
+    return ""

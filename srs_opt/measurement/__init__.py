@@ -1,0 +1,1 @@
+"""The laboratory: data sets, bench tests, shape and motion from markers, Motive import."""

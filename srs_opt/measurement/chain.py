@@ -1,0 +1,104 @@
+"""The chain's geometry in numpy, many frames at once: links' positions from pose and curvatures.
+
+Same geometry as :mod:`srs_opt.model.kinematics` (a test holds the two together), vectorised over
+frames and with its Jacobian in closed form. A configuration is ``q = (p_x, p_y, theta, kappa_1,
+..., kappa_{N-1})``: centre of mass, mean heading, curvatures from tail to head.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from srs_opt.measurement.records import Array
+from srs_opt.robot import Robot
+
+
+@dataclass(frozen=True)
+class Chain:
+    """What the geometry needs of a robot: links N, chamber length l, gap L_o."""
+
+    links: int
+    segment_length_m: float
+    gap_length_m: float
+
+    @property
+    def unknowns(self) -> int:
+        """Size N + 2 of a configuration."""
+        return self.links + 2
+
+    @property
+    def pitch_m(self) -> float:
+        """Distance of neighbouring links when straight."""
+        return self.segment_length_m + self.gap_length_m
+
+
+def chain_of(robot: Robot) -> Chain:
+    """Return the geometry of `robot`."""
+    return Chain(robot.links, robot.segment_length_m, robot.gap_length_m)
+
+
+def _sinc(h: Array) -> tuple[Array, Array]:
+    """Return S(h) = sin(h)/h and S'(h), by their series near 0."""
+    small = np.abs(h) < 1e-3
+    safe = np.where(small, 1.0, h)
+    value = np.where(small, 1 - h**2 / 6, np.sin(safe) / safe)
+    slope = np.where(small, -h / 3, (np.cos(safe) - value) / safe)
+    return value, slope
+
+
+def _unit(angle: Array) -> Array:
+    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+
+
+def _quarter_turn(vectors: Array) -> Array:
+    return np.stack([-vectors[..., 1], vectors[..., 0]], axis=-1)
+
+
+def headings(chain: Chain, q: Array) -> Array:
+    """Return the links' headings theta_i, shape (..., N): theta_{i+1} = theta_i + l kappa_i."""
+    steps = chain.segment_length_m * q[..., 3:]
+    relative = np.concatenate([np.zeros((*steps.shape[:-1], 1)), np.cumsum(steps, axis=-1)], axis=-1)
+    return q[..., 2:3] + relative - relative.mean(axis=-1, keepdims=True)
+
+
+def link_positions(chain: Chain, q: Array) -> Array:
+    """Return the links' positions, shape (..., N, 2), of configurations `q`, shape (..., N + 2)."""
+    theta = headings(chain, q)
+    middle = (theta[..., :-1] + theta[..., 1:]) / 2
+    length, _ = _sinc(chain.segment_length_m * q[..., 3:] / 2)
+    gaps = chain.gap_length_m / 2 * (_unit(theta[..., :-1]) + _unit(theta[..., 1:]))
+    steps = gaps + chain.segment_length_m * length[..., None] * _unit(middle)
+    relative = np.concatenate([np.zeros((*steps.shape[:-2], 1, 2)), np.cumsum(steps, axis=-2)], axis=-2)
+    return q[..., None, :2] + relative - relative.mean(axis=-2, keepdims=True)
+
+
+def position_jacobian(chain: Chain, q: Array) -> Array:
+    """Return the derivative of :func:`link_positions`, shape (..., N, 2, N + 2)."""
+    n, l = chain.links, chain.segment_length_m
+    theta = headings(chain, q)
+    heading_slopes = _heading_slopes(chain)  # (N, N - 1): d theta_i / d kappa_j
+    middle = (theta[..., :-1] + theta[..., 1:]) / 2
+    length, slope = _sinc(l * q[..., 3:] / 2)
+    turned = _quarter_turn(_unit(theta)) * chain.gap_length_m / 2
+    arc = l * length[..., None] * _quarter_turn(_unit(middle))
+    steps = (
+        turned[..., :-1, :, None] * heading_slopes[:-1, None, :]
+        + turned[..., 1:, :, None] * heading_slopes[1:, None, :]
+        + arc[..., None] * ((heading_slopes[:-1] + heading_slopes[1:]) / 2)[:, None, :]
+    )  # (..., N - 1, 2, N - 1): d step_i / d kappa_j
+    own = np.arange(n - 1)
+    steps[..., own, :, own] += np.moveaxis((l * l / 2 * slope)[..., None] * _unit(middle), -2, 0)
+    tail = np.zeros((*steps.shape[:-3], 1, 2, n - 1))
+    relative = np.concatenate([tail, np.cumsum(steps, axis=-3)], axis=-3)
+    out = np.empty((*q.shape[:-1], n, 2, n + 2))
+    out[..., :2] = np.eye(2)
+    out[..., 2] = _quarter_turn(link_positions(chain, q) - q[..., None, :2])
+    out[..., 3:] = relative - relative.mean(axis=-3, keepdims=True)
+    return out
+
+
+def _heading_slopes(chain: Chain) -> Array:
+    below = np.tril(np.ones((chain.links, chain.links - 1)), -1) * chain.segment_length_m
+    return np.asarray(below - below.mean(axis=0))

@@ -1,0 +1,161 @@
+"""Which position belongs to which link, frame by frame: swapped labels, ghosts, loose markers.
+
+Positions are followed from a frame whose order is known: each link takes the position nearest to where it was
+last seen (carried along with the links that are seen). Labels are not trusted at all, so it does not matter
+how often they swap.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from srs_opt.measurement.chain import Chain
+from srs_opt.measurement.records import Array
+
+NEAR = 0.45  # of a pitch: farther from its prediction, a position is not this link's
+FARTHEST = 0.9  # of a pitch: the gate of a link that was lost for long
+SLACK = 1.2  # neighbours may not be farther apart than this many pitches
+
+
+@dataclass(frozen=True, eq=False)
+class MendedLabels:
+    """Markers with their labels put right.
+
+    Attributes
+    ----------
+    markers_m : ndarray, shape (T, N, 2)
+    swapped : ndarray of bool, shape (T,)
+        Frames whose labels were permuted.
+    dropped : ndarray of bool, shape (T, N)
+        Positions (by their old label) that fit no link, reflections for instance, and were taken out.
+    """
+
+    markers_m: Array
+    swapped: np.ndarray
+    dropped: np.ndarray
+
+
+def mend_labels(chain: Chain, markers_m: Array) -> MendedLabels:
+    """Put right labels that are exchanged in some frames; take out positions that fit no link.
+
+    Parameters
+    ----------
+    chain : Chain
+    markers_m : ndarray, shape (T, N, 2)
+        Tail to head, NaN where lost. The first frame that shows most markers must be in order.
+    """
+    points = np.asarray(markers_m, dtype=float)
+    calm = np.zeros(len(points), dtype=bool), np.zeros(points.shape[:2], dtype=bool)
+    if not _suspicious(chain, points):
+        return MendedLabels(points, *calm)
+    counts = np.isfinite(points[..., 0]).sum(axis=1)
+    start = next((k for k in np.flatnonzero(counts == counts.max()) if fits_chain(chain, points[k])), None)
+    if start is None:
+        return MendedLabels(points, *calm)
+    owners = follow(chain, points, int(start), np.arange(chain.links))
+    mended = take(points, owners)
+    own = np.arange(chain.links)
+    swapped = ((owners >= 0) & (owners != own)).any(axis=1)
+    used = (owners[:, :, None] == own).any(axis=1)
+    return MendedLabels(mended, swapped, np.isfinite(points[..., 0]) & ~used)
+
+
+def _suspicious(chain: Chain, points: Array) -> bool:
+    """Whether any marker jumps between sightings, or neighbours lie too far apart."""
+    for marker in range(points.shape[1]):
+        seen = points[np.isfinite(points[:, marker, 0]), marker]
+        if len(seen) and (np.linalg.norm(np.diff(seen, axis=0), axis=1) > NEAR * chain.pitch_m).any():
+            return True
+    chords = np.linalg.norm(np.diff(points, axis=1), axis=2)
+    return bool((chords[np.isfinite(chords)] > SLACK * chain.pitch_m).any())
+
+
+def fits_chain(chain: Chain, frame: Array) -> bool:
+    """Whether no two seen links lie farther apart than the chain between them is long."""
+    seen = np.flatnonzero(np.isfinite(frame[:, 0]))
+    chords = np.linalg.norm(np.diff(frame[seen], axis=0), axis=1)
+    return bool(np.all(chords <= SLACK * chain.pitch_m * np.diff(seen)))
+
+
+def take(cloud: Array, owners: np.ndarray) -> Array:
+    """Return the links' positions, shape (T, N, 2), given which position each link owns (-1: none)."""
+    frames = np.arange(len(cloud))[:, None]
+    positions = cloud[frames, np.maximum(owners, 0)]
+    return np.where((owners >= 0)[..., None], positions, np.nan)
+
+
+def follow(chain: Chain, cloud: Array, start: int, order: np.ndarray) -> np.ndarray:
+    """Follow the links through all frames, forwards and backwards from `start`.
+
+    Parameters
+    ----------
+    chain : Chain
+    cloud : ndarray, shape (T, P, 2)
+        All positions seen, in any order; NaN where there is none.
+    start : int
+        Frame in which link i owns position ``order[i]`` (-1: not seen there).
+    order : ndarray of int, shape (N,)
+
+    Returns
+    -------
+    owners : ndarray of int, shape (T, N)
+        Position that each link owns in each frame, -1 where it was lost.
+    """
+    owners = np.full((len(cloud), chain.links), -1)
+    owners[start] = np.where(np.isfinite(cloud[start, np.maximum(order, 0), 0]), order, -1)
+    first = take(cloud[start : start + 1], owners[start : start + 1])[0]
+    for frames in (range(start + 1, len(cloud)), range(start - 1, -1, -1)):
+        last, age = first.copy(), np.where(np.isfinite(first[:, 0]), 0, 10)
+        for frame in frames:
+            owners[frame] = _assign(chain, cloud[frame], last, age)
+            _carry(last, age, cloud[frame], owners[frame])
+    return owners
+
+
+def _assign(chain: Chain, positions: Array, last: Array, age: np.ndarray) -> np.ndarray:
+    from scipy.optimize import linear_sum_assignment
+
+    seen = np.flatnonzero(np.isfinite(positions[:, 0]))
+    known = np.flatnonzero(np.isfinite(last[:, 0]))
+    owners = np.full(len(last), -1)
+    if not len(seen) or not len(known):
+        return owners
+    distance = np.linalg.norm(positions[seen, None] - last[None, known], axis=2)
+    gate = chain.pitch_m * np.minimum(NEAR * np.sqrt(1 + age[known] / 10), FARTHEST)
+    # a distance beyond the gate costs a constant, so that it does not push others out of place
+    cost = np.minimum(distance / gate, 1.0)
+    rows, columns = linear_sum_assignment(cost)
+    for row, column in zip(rows, columns):
+        if distance[row, column] < gate[column]:
+            owners[known[column]] = seen[row]
+    return _without_strays(chain, positions, owners)
+
+
+def _without_strays(chain: Chain, positions: Array, owners: np.ndarray) -> np.ndarray:
+    """Take out the position that makes neighbours too far apart (a reflection close to a lost marker)."""
+    links = np.where((owners >= 0)[:, None], positions[np.maximum(owners, 0)], np.nan)
+    while not fits_chain(chain, links):
+        seen = np.flatnonzero(np.isfinite(links[:, 0]))
+        if len(seen) < 3:
+            break
+        excess = np.linalg.norm(np.diff(links[seen], axis=0), axis=1) / np.diff(seen)
+        blame = np.zeros(len(seen))
+        blame[:-1] += excess
+        blame[1:] += excess
+        worst = seen[int(np.argmax(blame))]
+        links[worst], owners[worst] = np.nan, -1
+    return owners
+
+
+def _carry(last: Array, age: np.ndarray, positions: Array, owners: np.ndarray) -> None:
+    """Note where links are now; move the lost ones along with the mean of the seen ones."""
+    seen = owners >= 0
+    now = positions[np.maximum(owners, 0)]
+    both = seen & np.isfinite(last[:, 0])
+    if both.any():
+        last[~seen] += (now[both] - last[both]).mean(axis=0)
+    last[seen] = now[seen]
+    age[seen] = 0
+    age[~seen] += 1

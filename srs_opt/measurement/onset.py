@@ -1,0 +1,141 @@
+"""When the valves started, from the first motion of the markers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from srs_opt.errors import NoAnswerError
+from srs_opt.measurement.chain import Chain, chain_of, link_positions
+from srs_opt.measurement.records import Array
+from srs_opt.measurement.steps import step_response
+from srs_opt.robot import Robot
+
+THRESHOLD = 6.0
+QUIET_FRAMES = 5
+CYCLES = 2.0
+
+
+@dataclass(frozen=True)
+class Onset:
+    """Start of the valves on the camera's clock; a dead time of the valves is part of it."""
+
+    time_s: float
+    sd_s: float
+
+
+@dataclass(frozen=True)
+class Gait:
+    """The valve wave (13) of a trial."""
+
+    frequency_hz: float
+    pressure_kpa: float
+    offset: float
+    phase_lag_rad: float
+
+
+def first_curvatures(robot: Robot, gait: Gait, time_s: Array, slowness: float = 1.0) -> Array:
+    """Return the curvatures that the valve wave gives from rest at time 0, shape (T, N-1).
+
+    Sums of step responses (14), one per switch, up to the end of `time_s`; `slowness` multiplies both time
+    constants.
+    """
+    total = robot.tau1_s + robot.tau2_s
+    s, q = slowness * total / 2, ((robot.tau1_s - robot.tau2_s) / total) ** 2
+    omega = 2 * np.pi * gait.frequency_hz
+    fine = np.arange(1e-6, max(float(time_s[-1]), 1e-3), 2e-4)
+    columns = []
+    for segment in range(1, robot.links):
+        state = np.where(np.sin(omega * fine + gait.phase_lag_rad * segment) + gait.offset > 0, 1.0, -1.0)
+        column = state[0] * step_response(time_s, s, q)
+        for k in np.flatnonzero(np.diff(state)):
+            column = column + (state[k + 1] - state[k]) * step_response(time_s - fine[k], s, q)
+        columns.append(column)
+    return np.column_stack(columns) * robot.curvature_per_pressure_1_m_kpa * gait.pressure_kpa
+
+
+def noise_sd(points_m: Array) -> float:
+    """Return the noise of one coordinate from third differences (a smooth motion hardly has any)."""
+    third = np.diff(points_m.reshape(len(points_m), -1), n=3, axis=0)
+    third = third[np.isfinite(third)]
+    return float(np.median(np.abs(third)) / 0.6745 / np.sqrt(20)) if len(third) else 0.0
+
+
+def find_onset(robot: Robot, gait: Gait, time_s: Array, markers_m: Array) -> Onset:
+    """Fit the shapes of the first cycles with those that the valve wave gives, whatever way the robot moves.
+
+    Fitted are the start and factors on C0 and on the time constants; position and heading are free in every
+    frame, so friction does not matter.
+
+    Parameters
+    ----------
+    robot : Robot
+        Its geometry, C0, tau_1 and tau_2.
+    gait : Gait
+        What the valves were told to do.
+    time_s : ndarray, shape (T,)
+    markers_m : ndarray, shape (T, N, 2)
+        Tracks, tail to head, that begin before the motion does.
+
+    Raises
+    ------
+    NoAnswerError
+        If the robot never moves, moves from the first frames on, or has no valve wave.
+    """
+    from scipy.optimize import least_squares
+
+    if not gait.frequency_hz > 0:
+        raise NoAnswerError("without a valve wave the start cannot be found: give valve_start_s by hand")
+    moving = _first_motion(markers_m.reshape(len(markers_m), -1), noise_sd(markers_m))
+    if moving is None:
+        raise NoAnswerError("the markers never move: give valve_start_s by hand")
+    if moving < QUIET_FRAMES:
+        raise NoAnswerError("the take begins in motion: give valve_start_s by hand")
+    centre, settle = float(time_s[moving]), robot.tau1_s + robot.tau2_s
+    window = (time_s > centre - 2 * settle) & (time_s < centre + CYCLES / gait.frequency_hz)
+    time, points = time_s[window], markers_m[window]
+    z = points[..., 0] + 1j * points[..., 1]
+    chain = chain_of(robot)
+
+    def gaps(p: Array) -> Array:
+        kappa = p[1] * first_curvatures(robot, gait, time - p[0], p[2])
+        return _shape_gaps(chain, kappa, z)
+
+    grid = centre - settle * np.linspace(0.0, 2.0, 25)
+    best = min(grid, key=lambda start: float((gaps(np.array([start, 1.0, 1.0])) ** 2).sum()))
+    bounds = ([best - settle, 0.3, 0.3], [best + settle, 3.0, 3.0])
+    fit = least_squares(gaps, [best, 1.0, 1.0], bounds=bounds, x_scale=[0.01, 0.1, 0.1], diff_step=1e-5)
+    variance = 2 * fit.cost / max(len(fit.fun) - 3 * len(time) - 3, 1)
+    covariance = np.linalg.pinv(fit.jac.T @ fit.jac) * variance
+    return Onset(float(fit.x[0]), float(np.sqrt(covariance[0, 0])))
+
+
+def _shape_gaps(chain: Chain, kappa: Array, z: NDArray[np.complex128]) -> Array:
+    """Return seen minus modelled positions after the best turn and shift of every frame, flat."""
+    q = np.concatenate([np.zeros((len(kappa), 3)), kappa], axis=1)
+    model = link_positions(chain, q)
+    seen = np.isfinite(z)
+    count = np.maximum(seen.sum(axis=1, keepdims=True), 1)
+    z = np.where(seen, z, 0.0)
+    m = np.where(seen, model[..., 0] + 1j * model[..., 1], 0.0)
+    z = np.where(seen, z - z.sum(axis=1, keepdims=True) / count, 0.0)
+    m = np.where(seen, m - m.sum(axis=1, keepdims=True) / count, 0.0)
+    turn = (np.conj(m) * z).sum(axis=1, keepdims=True)
+    gap = z - np.exp(1j * np.angle(turn)) * m
+    return np.concatenate([gap.real.ravel(), gap.imag.ravel()])
+
+
+def _first_motion(flat: Array, sd: float) -> int | None:
+    """Return the frame from which on the coordinates leave their rest (three frames in a row)."""
+    import warnings
+
+    rest = np.full(flat.shape[1], np.nan)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", category=RuntimeWarning)  # a marker lost throughout the rest
+        rest = np.nanmedian(flat[:QUIET_FRAMES], axis=0)
+        off = np.nanmax(np.abs(flat - rest), axis=1)
+    beyond = np.nan_to_num(off) > THRESHOLD * max(sd, 1e-9)
+    run = beyond[:-2] & beyond[1:-1] & beyond[2:]
+    return int(np.argmax(run)) if run.any() else None

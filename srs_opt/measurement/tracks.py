@@ -1,0 +1,231 @@
+"""Camera tracks of one trial: reading, and checks of clock, units, order and losses."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from srs_opt.measurement.plausible import factor_of_thousand
+from srs_opt.measurement.problem import Report
+from srs_opt.measurement.records import TAIL_TO_HEAD, Array, Trial
+from srs_opt.measurement.table import NumberTable, read_numbers
+from srs_opt.robot import Robot
+
+MAX_MISSING_ROWS = 5
+TOP_SPEED_LENGTHS_PER_S = 25.0
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """Samples as the file has them: times (T,), points (T, P, 2) with NaN where lost, line of each sample."""
+
+    file: str
+    time_s: Array
+    points_m: Array
+    lines: tuple[int, ...] | range
+
+
+def track_columns(markers: str, links: int) -> tuple[str, ...]:
+    """Return the columns of a track file."""
+    if markers != TAIL_TO_HEAD:
+        return ("time_s", "x_m", "y_m")
+    return ("time_s", *(f"{axis}{i}_m" for i in range(1, links + 1) for axis in "xy"))
+
+
+def read_track(file: str, markers: str, links: int, report: Report) -> Track | None:
+    """Read one track; None (and a report) when nothing can be made of it."""
+    table = read_numbers(file, report)
+    if table is None:
+        if not any(p.file == file for p in report.problems):
+            report.error(file, None, "holds no rows")
+        return None
+    expected = track_columns(markers, links)
+    if table.header != expected:
+        _report_columns(file, table, expected, markers, links, report)
+        return None
+    time = table.values[:, 0]
+    points = np.ascontiguousarray(table.values[:, 1:].reshape(len(time), -1, 2))
+    points, time = points.copy(), time.copy()
+    half = np.isnan(points).any(axis=2) & ~np.isnan(points).all(axis=2)
+    if half.any():
+        frame, marker = np.argwhere(half)[0]
+        report.warn(file, table.lines[frame], f"marker {marker + 1} has one coordinate of two; taken as lost")
+        points[half] = np.nan
+    time.flags.writeable = points.flags.writeable = False
+    return Track(file, time, points, table.lines)
+
+
+def _report_columns(
+    file: str, table: NumberTable, expected: tuple[str, ...], markers: str, links: int, report: Report
+) -> None:
+    found = (len(table.header) - 1) / 2
+    if markers == TAIL_TO_HEAD and found == int(found) and found != links:
+        report.error(file, 1, f"has {int(found)} markers where the robot has {links} links (robot.yaml)")
+        return
+    for name in expected:
+        if name not in table.header:
+            report.error(file, 1, f"column '{name}' is missing (expected {', '.join(expected[:3])}, ...)")
+    for name in table.header:
+        if name not in expected:
+            report.error(file, 1, f"column '{name[:40]}' is not part of a {markers} track")
+    if set(table.header) == set(expected):
+        report.error(file, 1, f"columns are out of order (expected {', '.join(expected[:3])}, ...)")
+
+
+def check_track(
+    trial: Trial, track: Track, robot: Robot, rate_hz: float, marker_sd_m: float, report: Report
+) -> None:
+    """Report what is implausible about a track."""
+    lost = np.isnan(track.points_m[..., 0])
+    if lost.all():
+        report.error(track.file, None, "every marker is lost in every frame: the trial holds no measurement")
+        return
+    good_clock = _check_clock(trial, track, rate_hz, report)
+    for marker in np.flatnonzero(lost.all(axis=0)):
+        report.warn(track.file, None, f"marker {marker + 1} is never seen")
+    if lost.mean() > 0.2:
+        report.warn(track.file, None, f"{100 * lost.mean():.0f} % of the marker positions are lost")
+    if track.points_m.shape[1] > 1:
+        good_units = _check_spacing(track, robot, report)
+        if good_units:
+            _check_start(trial, track, robot, report)
+    else:
+        good_units = _check_speed(track, robot, good_clock, report)
+    if good_units:
+        _check_noise(track, marker_sd_m, report)
+
+
+def _check_clock(trial: Trial, track: Track, rate_hz: float, report: Report) -> bool:
+    time, file, lines = track.time_s, track.file, track.lines
+    for row in np.flatnonzero(np.isnan(time)):
+        report.error(file, lines[row], "time_s: expected a number, found an empty cell")
+    if np.isnan(time).any():
+        return False
+    if len(time) < 2:
+        report.error(file, None, "has a single sample")
+        return False
+    steps = np.diff(time)
+    step = 1 / rate_hz if rate_hz > 0 else float(np.median(steps))
+    typical = float(np.median(steps))
+    scale = factor_of_thousand(typical / step) if typical > 0 else ""
+    if typical > 0 and not 0.98 < typical / step < 1.02:
+        reason = f"time_s in {scale}seconds?" if scale else "is camera.rate_hz right?"
+        report.error(
+            file, lines[0], f"samples lie {typical:g} s apart and camera.rate_hz says {step:g} s: {reason}"
+        )
+        return False
+    fine = True
+    for row in np.flatnonzero(np.abs(steps - step) > 0.25 * step):
+        fine = _report_step(float(steps[row]), step, file, lines[row + 1], report) and fine
+    if abs(time[0]) > 0.5 * step:
+        report.warn(file, lines[0], f"the first sample is labelled {time[0]:g} s, expected 0")
+    _check_duration(trial, float(time[-1] - time[0]) + step, step, file, lines[-1], report)
+    return fine
+
+
+def _report_step(found: float, step: float, file: str, line: int, report: Report) -> bool:
+    if found <= 0:
+        words = "goes backwards" if found < 0 else "stands still"
+        report.error(file, line, f"time_s: the clock {words} ({found:+.6g} s)")
+        return False
+    missing = round(found / step) - 1
+    if 1 <= missing <= MAX_MISSING_ROWS and abs(found / step - missing - 1) < 0.25:
+        report.warn(file, line, f"time_s: {missing} frame(s) are missing before this one")
+        return True
+    hint = "; if frames were lost, give them rows with empty cells" if missing > MAX_MISSING_ROWS else ""
+    report.error(file, line, f"time_s: the clock jumps by {found:.6g} s, expected {step:.6g} s{hint}")
+    return False
+
+
+def _check_duration(trial: Trial, span: float, step: float, file: str, line: int, report: Report) -> None:
+    wanted = trial.duration_s
+    if not wanted > 0 or abs(span - wanted) <= max(2.5 * step, 0.01 * wanted):
+        return
+    scale = factor_of_thousand(wanted / span)
+    message = f"the track lasts {span:.4g} s and trials.csv says duration_s {wanted:g}"
+    if scale:
+        report.error(file, line, f"{message}: {scale}seconds there?")
+    elif abs(span - wanted) > 0.2 * wanted:
+        report.error(file, line, message)
+    else:
+        report.warn(file, line, message)
+
+
+def _check_spacing(track: Track, robot: Robot, report: Report) -> bool:
+    chords = np.linalg.norm(np.diff(track.points_m, axis=1), axis=2)
+    if np.isnan(chords).all():
+        return True
+    ratio = float(np.nanquantile(chords, 0.75)) / robot.pitch_m
+    if 0.6 < ratio < 1.5:
+        return True
+    pitch, found = robot.pitch_m, ratio * robot.pitch_m
+    scale = factor_of_thousand(ratio)
+    units = {"milli": "millimetres", "kilo": "kilometres", "micro": "micrometres"}
+    if scale:
+        why = f"positions in {units.get(scale, 'other units')}, expected metres?"
+    elif 80 < ratio < 120:
+        why = "positions in centimetres, expected metres?"
+    elif 33 < ratio < 45:
+        why = "positions in inches, expected metres?"
+    else:
+        why = "are the markers in order, tail to head, and is it this robot?"
+    message = f"neighbouring markers lie {found:.3g} m apart where the robot's pitch is {pitch:.3g} m: {why}"
+    report.error(track.file, track.lines[0], message)
+    return False
+
+
+def _check_start(trial: Trial, track: Track, robot: Robot, report: Report) -> None:
+    """The robot starts straight along heading_rad with its tail at the origin."""
+    points = track.points_m
+    tail, head = points[:10, 0], points[:10, -1]
+    if np.isnan(tail[:, 0]).all() or np.isnan(head[:, 0]).all() or trial.kind in ("tow", "push", "step"):
+        return
+    start = np.nanmean(tail, axis=0)
+    along = np.nanmean(head, axis=0) - start
+    gap = math.remainder(math.atan2(along[1], along[0]) - trial.heading_rad, 2 * math.pi)
+    degrees = math.remainder(math.atan2(along[1], along[0]) - math.radians(trial.heading_rad), 2 * math.pi)
+    if abs(gap) > 2.9 and abs(degrees) > 0.2:
+        report.error(track.file, track.lines[0], "the markers run head to tail, expected tail to head")
+    elif abs(gap) > 0.2:
+        hint = " (given in degrees?)" if abs(degrees) < 0.2 else ""
+        message = f"the robot starts {gap:+.2f} rad away from its heading_rad {trial.heading_rad:g}{hint}"
+        report.warn(track.file, track.lines[0], message)
+    if np.linalg.norm(start) > robot.length_m:
+        message = f"the tail starts at ({start[0]:.3g}, {start[1]:.3g}) m, expected the origin"
+        report.warn(track.file, track.lines[0], message)
+
+
+def _check_speed(track: Track, robot: Robot, good_clock: bool, report: Report) -> bool:
+    """A centre-of-mass track has no length of its own: its speed must stand in."""
+    points, time = track.points_m[:, 0], track.time_s
+    seen = np.flatnonzero(~np.isnan(points[:, 0]))
+    if len(seen) < 2 or not good_clock:
+        return True
+    span = float(time[seen[-1]] - time[seen[0]])
+    extent = float(np.ptp(points[seen], axis=0).max())
+    limit = TOP_SPEED_LENGTHS_PER_S * robot.length_m
+    if extent / max(span, 1e-9) <= limit:
+        return True
+    message = (
+        f"the robot covers {extent:.3g} m in {span:.3g} s, above {limit:.2g} m/s: positions in millimetres?"
+    )
+    report.error(track.file, track.lines[0], message)
+    return False
+
+
+def _check_noise(track: Track, marker_sd_m: float, report: Report) -> None:
+    """Third differences of a smooth motion are noise alone (their variance is 20 times one sample's)."""
+    third = np.diff(track.points_m, n=3, axis=0)
+    third = third[np.isfinite(third)]
+    if len(third) < 100 or not marker_sd_m > 0:
+        return
+    ratio = float(np.median(np.abs(third)) / 0.6745 / math.sqrt(20)) / marker_sd_m
+    message = f"marker noise is {ratio:.2g} times camera.marker_sd_m ({marker_sd_m:g} m)"
+    if ratio > 200 or 0 < ratio < 1 / 200:
+        report.error(track.file, None, f"{message}: units?")
+    elif ratio > 5 or 0 < ratio < 0.2:
+        report.warn(
+            track.file, None, f"marker noise is {ratio:.2g} times camera.marker_sd_m ({marker_sd_m:g} m)"
+        )
