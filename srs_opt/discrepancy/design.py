@@ -1,0 +1,129 @@
+"""Step 10: the experiment that would tell the rivals apart, with the power to expect."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from srs_opt.calibrate.fit import Experiment, Point
+from srs_opt.calibrate.gram import bounded_solve
+from srs_opt.discrepancy.hypothesis import Hypothesis
+from srs_opt.errors import NoAnswerError
+from srs_opt.measurement.records import Schedule, Trial
+
+LEVEL = 10.0  # deviance that tells two hypotheses apart
+_SECONDS, _RATE_HZ = 4.0, 60.0
+
+
+@dataclass(frozen=True)
+class NextExperiment:
+    """What to do next.
+
+    Attributes
+    ----------
+    what : str
+    separates : tuple of str
+        The rivals.
+    expected_power : float
+        Probability that it decides between them, if one of them is right.
+    """
+
+    what: str
+    separates: tuple[str, ...]
+    expected_power: float
+
+
+@dataclass(frozen=True)
+class Instrument:
+    """A reading, its standard deviation, and how it depends on fitted values."""
+
+    what: str
+    sd: float
+    coordinate: str
+
+
+INSTRUMENTS = (
+    Instrument("a light on the valve's command (valve_light_delay_s)", 0.002, "clock_offset.offset_s"),
+    Instrument("a ruler in the picture (ruler_scale)", 0.002, "camera_scale.scale"),
+    Instrument("a ruler in the picture at x = 1 m (ruler_scale_at_1m)", 0.002, "camera_tilt.per_m"),
+    Instrument("a scale under the tail's wheels (tail_load_n)", 0.005, "tether_weight.load_n"),
+    Instrument("a scale under the head's wheels (head_load_n)", 0.005, "head_mass.extra_kg"),
+)  # fmt: skip
+
+
+def next_experiment(
+    experiment: Experiment, rivals: Sequence[Hypothesis], trials: Sequence[Trial]
+) -> NextExperiment | None:
+    """Return the instrument or trial that best separates the two leading rivals."""
+    if len(rivals) < 2 or not trials:
+        return None
+    first, second = rivals[0], rivals[1]
+    options = {i.what: _instrument_gain(i, first, second) for i in INSTRUMENTS}
+    for what, trial in proposals(experiment, trials).items():
+        gain = min(_trial_gain(experiment, a, b, trial) for a, b in ((first, second), (second, first)))
+        options[what] = gain
+    what, gain = max(options.items(), key=lambda item: item[1])
+    names = tuple(" + ".join(h.names) for h in rivals)
+    return NextExperiment(what, names, round(power(gain), 3))
+
+
+def power(gain: float) -> float:
+    """Return the probability that a separation of expected deviance `gain` exceeds the level that decides."""
+    from scipy import stats
+
+    return float(stats.ncx2.sf(LEVEL, 1, max(gain, 1e-9)))
+
+
+def _instrument_gain(instrument: Instrument, a: Hypothesis, b: Hypothesis) -> float:
+    values = [h.fit.point.values.get(instrument.coordinate, 0.0) for h in (a, b)]
+    sds = [h.fit.sd.get(instrument.coordinate, 0.0) for h in (a, b)]
+    return float((values[0] - values[1]) ** 2 / (instrument.sd**2 + max(sds) ** 2))
+
+
+def proposals(experiment: Experiment, trials: Sequence[Trial]) -> Mapping[str, Trial]:
+    """Return trials worth considering, beside repeats of what was done."""
+    model = max(trials, key=lambda t: (t.pressure_kpa, t.frequency_hz))
+    time_s = np.arange(int(_SECONDS * _RATE_HZ)) / _RATE_HZ
+    blank = np.zeros((time_s.size, experiment.model.links, 2))
+    plain = replace(
+        model,
+        name="(next)",
+        time_s=time_s,
+        markers_m=blank,
+        centre_m=None,
+        duration_s=_SECONDS,
+        schedule=None,
+    )
+    segments = experiment.model.segments
+    steps = Schedule("step", 2.0, ((1, 0.0, 1.0),))
+    found = {
+        "a trial with the tether taken off": replace(plain, tether=False),
+        "a slow, strong gait (0.5 Hz, 55 kPa)": replace(plain, frequency_hz=0.5, pressure_kpa=55.0),
+        "a fast, weak gait (2.5 Hz, 35 kPa)": replace(plain, frequency_hz=2.5, pressure_kpa=35.0),
+        "a fast, long wave (2 Hz, lag 0.9 rad)": replace(plain, frequency_hz=2.0, phase_lag_rad=0.9),
+        "the same gait in the opposite heading": replace(plain, heading_rad=plain.heading_rad + np.pi),
+    }
+    for segment in range(1, segments + 1):
+        one = replace(steps, intervals=((segment, 0.0, 1.0),))
+        step = replace(plain, schedule=one, frequency_hz=0.5, kind="step")
+        found[f"a step of segment {segment} alone"] = step
+    return found
+
+
+def _trial_gain(experiment: Experiment, truth: Hypothesis, other: Hypothesis, trial: Trial) -> float:
+    """Return the deviance by which `other` would miss a trial that `truth` predicts, refitted to all data."""
+    probe = Experiment(experiment.model, (trial,), experiment.sd_m)
+    try:
+        expected = probe.predict(trial, Point(truth.fit.point.values))
+        probe.tracks[trial.name] = expected.points
+        gram = probe.gram(trial, Point(other.fit.point.values), other.fit.coordinates)
+    except NoAnswerError:
+        return 0.0
+    known = np.linalg.pinv(other.fit.covariance, hermitian=True)
+    total = gram.eliminated().matrix.copy()
+    total[:-1, :-1] += known
+    free = [k for k in range(len(other.fit.coordinates)) if other.fit.covariance[k, k] > 0]
+    none = np.zeros(len(other.fit.coordinates))
+    return bounded_solve(total, free, none, none, none - np.inf).deviance

@@ -1,0 +1,93 @@
+"""A hypothesis: the model with some effects added, fitted to the open trials."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from srs_opt.calibrate.coordinates import Candidate, Coordinate, effect_spec
+from srs_opt.calibrate.fit import Experiment, Fit, Point, fit
+from srs_opt.measurement.records import Trial
+
+ITERATIONS = 20
+SMALL, LARGE = 0.15, 4.0  # sizes over typical that a named effect may have in company, and alone
+FAR = 3.5  # standard deviations that a calibrated value may lie from its bench value
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """Effects and their fit.
+
+    Attributes
+    ----------
+    candidates : tuple of Candidate
+        In the order in which they were added.
+    fit : Fit
+    """
+
+    candidates: tuple[Candidate, ...]
+    fit: Fit
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Effects, sorted, without their places."""
+        return tuple(sorted({c.effect for c in self.candidates}))
+
+    @property
+    def label(self) -> str:
+        """Effects with their places."""
+        return " + ".join(c.label for c in self.candidates) or "no effect"
+
+    @property
+    def parameters(self) -> int:
+        """Number of coordinates that the effects add."""
+        return sum(len(c.coordinates) for c in self.candidates)
+
+    @property
+    def deviance(self) -> float:
+        """-2 log posterior of the fit."""
+        return self.fit.deviance
+
+    def relative_size(self, candidate: Candidate) -> float:
+        """Return an effect's fitted size over its typical one."""
+        values = [self.fit.point.values[c.name] / c.typical for c in candidate.sizes]
+        return float(np.linalg.norm(values))
+
+    def implausible(self) -> str:
+        """Return what physics or the bench has against the fitted values; empty when nothing."""
+        for candidate in self.candidates:
+            size = self.relative_size(candidate)
+            if size > LARGE:
+                return f"{candidate.label} would have to be {size:.1f} times its typical size"
+            if size < SMALL and len(self.candidates) > 1:
+                return f"{candidate.label} would be only {size:.2f} of its typical size"
+        for coordinate in self.fit.coordinates:
+            if np.isfinite(coordinate.prior_sd) and not coordinate.effect:
+                off = (self.fit.point.values[coordinate.name] - coordinate.start) / coordinate.prior_sd
+                if abs(off) > FAR:
+                    return (
+                        f"{coordinate.name} would lie {abs(off):.1f} standard deviations from its bench value"
+                    )
+        return ""
+
+    def specs(self) -> list[dict[str, Any]]:
+        """Return the effects as entries of a robot file."""
+        return [effect_spec(c, self.fit.point.values) for c in self.candidates]
+
+
+def fit_hypothesis(
+    experiment: Experiment,
+    base: Sequence[Coordinate],
+    candidates: Sequence[Candidate],
+    start: Point,
+    trials: Sequence[Trial],
+    iterations: int = ITERATIONS,
+    beat: float = math.inf,
+) -> Hypothesis:
+    """Fit the base coordinates together with the effects of `candidates`."""
+    coordinates = (*base, *(c for k in candidates for c in k.coordinates))
+    return Hypothesis(tuple(candidates), fit(experiment, coordinates, start, trials, iterations, beat=beat))

@@ -1,0 +1,129 @@
+"""The report's pictures, as PNG in base64."""
+
+from __future__ import annotations
+
+import base64
+import io
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from srs_opt.discrepancy.locate import misfit_by_trial
+from srs_opt.discrepancy.pipeline import Discrepancy
+from srs_opt.discrepancy.seal import sealed_residuals
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True)
+class Picture:
+    """One picture with its words."""
+
+    title: str
+    caption: str
+    png: str
+
+
+def pictures(found: Discrepancy) -> list[Picture]:
+    """Return the pictures that the result allows."""
+    if found.null is None or found.best is None or found.experiment is None or found.selection is None:
+        return []
+    drawn = [_candidates(found), _trials(found)]
+    if found.split.sealed:
+        drawn.insert(0, _sealed(found))
+    return drawn
+
+
+def _figure(width: float, height: float) -> Figure:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), dpi=110, layout="constrained")
+    return figure
+
+
+def _encoded(figure: Figure, title: str, caption: str) -> Picture:
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", metadata={"Software": None})
+    return Picture(title, caption, base64.b64encode(stream.getvalue()).decode("ascii"))
+
+
+def _sealed(found: Discrepancy) -> Picture:
+    """Draw the smoothed residual over time on the sealed trials, before and after."""
+    assert found.experiment is not None and found.null is not None and found.selection is not None
+    trials = found.split.sealed[:4]
+    fits = [found.null.hypothesis.fit, found.selection.best.fit]
+    figure = _figure(8, 1.0 + 1.5 * len(trials))
+    axes = figure.subplots(len(trials), 1, sharex=True, squeeze=False)[:, 0]
+    labels = ("calibration alone", "with the effect")
+    colours = ("tab:red", "tab:blue")
+    shown = 2 if found.selection.best.candidates else 1
+    for fit, label, colour in list(zip(fits, labels, colours))[:shown]:
+        for axis, trial, residual in zip(axes, trials, sealed_residuals(found.experiment, fit, trials)):
+            axis.plot(trial.time_s, 1e3 * _rolling(residual), color=colour, label=label, lw=1.3)
+            axis.set_ylabel(f"{trial.name}\nmm")
+    for axis in axes:
+        axis.axhline(1e3 * found.sd_m, color="k", lw=0.8, ls="--", label="noise floor")
+        axis.set_ylim(bottom=0)
+    axes[0].legend(loc="upper left", ncols=3, fontsize=8)
+    axes[-1].set_xlabel("time, s")
+    return _encoded(
+        figure,
+        "The gap on sealed trials",
+        "Distance between model and markers (root mean square per coordinate over a fifth of a second), each "
+        "trial with its own most probable friction and curvature within the scatter.",
+    )
+
+
+def _rolling(residual: np.ndarray, width: int = 24) -> np.ndarray:
+    """Return the root mean square over all coordinates in a running window of frames."""
+    square = np.nan_to_num(residual) ** 2
+    kernel = np.ones(min(width, residual.shape[0]))
+    total = np.convolve(square.sum(axis=1), kernel, mode="same")
+    count = np.convolve(np.isfinite(residual).sum(axis=1), kernel, mode="same")
+    return np.asarray(np.sqrt(total / np.maximum(count, 1)))
+
+
+def _candidates(found: Discrepancy) -> Picture:
+    """Draw every effect's expected gain on a log axis."""
+    assert found.null is not None
+    best: dict[str, float] = {}
+    for score in found.scores:
+        gain = score.improvement * found.null.linearisation.temper
+        best.setdefault(score.candidate.effect, max(gain, 0.0))
+    names = list(best)[::-1]
+    figure = _figure(8, 0.5 + 0.22 * len(names))
+    axis = figure.subplots()
+    chosen = found.selection.best.names if found.selection else ()
+    axis.barh(
+        names, [best[n] + 0.1 for n in names], color=["tab:blue" if n in chosen else "0.7" for n in names]
+    )
+    axis.axvline(20, color="k", ls="--", lw=0.8)
+    axis.set_xscale("log")
+    axis.set_xlabel("expected gain (drop of the deviance); dashed: about what chance gives the best of all")
+    axis.tick_params(labelsize=8)
+    return _encoded(
+        figure,
+        "What each effect would explain",
+        "From one linearisation about the calibrated model, without refitting; blue: in the best set.",
+    )
+
+
+def _trials(found: Discrepancy) -> Picture:
+    """Draw the misfit of every open trial, before and after."""
+    assert found.null is not None and found.best is not None
+    before, after = misfit_by_trial(found.null), misfit_by_trial(found.best)
+    names = [t.name for t in found.split.open]
+    place = np.arange(len(names))
+    figure = _figure(8, 2.6)
+    axis = figure.subplots()
+    axis.semilogy(place, [before[n] for n in names], "o", color="tab:red", label="calibration alone")
+    axis.semilogy(
+        place, [after[n] for n in names], "s", mfc="none", color="tab:blue", label="best set of effects"
+    )
+    axis.axhline(1, color="k", ls="--", lw=0.8)
+    axis.set_xticks(place, names, rotation=60, fontsize=8)
+    axis.set_ylabel("misfit / noise variance")
+    axis.legend(fontsize=8)
+    return _encoded(figure, "Every open trial", "1 is what noise alone leaves.")

@@ -1,0 +1,118 @@
+"""report.html: verdict first, then the evidence, then the caveats; one file that needs nothing else."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from srs_opt.discrepancy.pictures import pictures
+from srs_opt.discrepancy.pipeline import Discrepancy
+from srs_opt.discrepancy.verdict import NAMED, NO_GAP, NOT_TESTABLE, ONE_OF, UNKNOWN
+from srs_opt.files import write_text
+
+HEADLINES = {
+    NO_GAP: "No gap: the calibrated model explains these data",
+    NAMED: "Named: {names}",
+    ONE_OF: "One of: {names}",
+    UNKNOWN: "A gap that no known effect explains",
+    NOT_TESTABLE: "Not testable with these data",
+}
+
+
+def write_report(found: Discrepancy, record: dict[str, Any], path: Path) -> Path:
+    """Write the report.
+
+    Parameters
+    ----------
+    found : Discrepancy
+    record : dict
+        The JSON answer, so that the report says nothing else.
+    path : Path
+    """
+    from importlib import resources
+
+    from jinja2 import Environment
+
+    text = resources.files("srs_opt.discrepancy").joinpath("report.html.jinja").read_text(encoding="utf-8")
+    environment = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    template = environment.from_string(text)
+    names = [" + ".join(e["name"] for e in record["effects"])] + [
+        " + ".join(a) for a in record["alternatives"]
+    ]
+    page = template.render(
+        headline=HEADLINES[record["verdict"]].format(names=" or ".join(n for n in names if n)),
+        answer=record,
+        dataset=found.dataset,
+        split=found.split,
+        calibrated=_parameters(found),
+        tests=_tests(found),
+        caveats=caveats(found),
+        pictures=pictures(found),
+        noise_mm=1e3 * found.sd_m,
+    )
+    return write_text(path, page)
+
+
+def _parameters(found: Discrepancy) -> list[dict[str, Any]]:
+    """Return bench and calibrated values of the robot, with what the verdict's effects change."""
+    import math
+
+    if found.null is None or found.selection is None:
+        return []
+    rows = []
+    fits = [found.null.hypothesis.fit, found.selection.best.fit]
+    for coordinate in fits[0].coordinates:
+        bench = getattr(found.dataset.robot, coordinate.name)
+        values = [bench * math.exp(f.point.values[coordinate.name]) for f in fits]
+        off = fits[1].point.values[coordinate.name] - coordinate.start
+        rows.append(
+            {
+                "name": coordinate.name,
+                "bench": bench,
+                "alone": values[0],
+                "with_effect": values[1],
+                "sd": values[1] * fits[1].sd[coordinate.name],
+                "off": off / coordinate.prior_sd,
+            }
+        )
+    return rows
+
+
+def _tests(found: Discrepancy) -> list[dict[str, Any]]:
+    rows = []
+    for what, examined in (("calibration alone", found.null), ("best set of effects", found.best)):
+        if examined is not None:
+            rows.append(
+                {
+                    "what": f"{what}: {examined.hypothesis.label}",
+                    "p": examined.detection.p_value,
+                    "misfit": examined.hypothesis.fit.misfit_ratio,
+                }
+            )
+    return rows
+
+
+def caveats(found: Discrepancy) -> list[str]:
+    """Return what a reader should know before acting."""
+    notes = []
+    stated = found.dataset.marker_sd_m
+    if not 0.8 < found.sd_m / stated < 1.25:
+        notes.append(
+            f"The set states {stated * 1e3:.2f} mm of marker noise; the tracks show "
+            f"{found.sd_m * 1e3:.2f} mm, which is what was used."
+        )
+    notes += [f"Trial {name} was left out: {why}." for name, why in found.split.left_out]
+    if found.gap is not None and found.gap.trials < 5:
+        notes.append(f"Only {found.gap.trials} trials were sealed: the interval of the gap is wide.")
+    if found.dataset.trials and found.dataset.trials[0].markers_m is None:
+        notes.append(
+            "Only the centre of mass was tracked: what bends the body and what moves it look much alike."
+        )
+    notes.append(
+        "Friction and curvature per pressure are taken to scatter by 3 %, 3 % and 1 % from trial to trial; "
+        "more than that would look like an effect."
+    )
+    notes.append(
+        "The friction's smoothing speed is fitted as a nuisance; the corrected robot keeps the file's value."
+    )
+    return notes

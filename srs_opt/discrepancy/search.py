@@ -1,0 +1,272 @@
+"""Steps 6 and 7: refit what the screen proposes, add, drop and swap until nothing is left to explain."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from srs_opt.calibrate.coordinates import Candidate, Coordinate
+from srs_opt.calibrate.fit import Experiment, Fit, Point, priors, sum_eliminated
+from srs_opt.discrepancy.detect import Detection, detect, project
+from srs_opt.discrepancy.functions import Group, ResidualFunctions
+from srs_opt.discrepancy.hypothesis import ITERATIONS, SMALL, Hypothesis, fit_hypothesis
+from srs_opt.discrepancy.screen import Linearisation, Score, expected_start, screen
+from srs_opt.discrepancy.split import spread
+from srs_opt.errors import NoAnswerError
+from srs_opt.measurement.records import Trial
+
+DEEPEST, ROUNDS = 4, 6  # effects at once; additions or exchanges in all
+ADEQUATE = 0.01  # level at which a fitted model is rejected
+FALSE_NAME = 0.002  # family-wise level for adding an effect
+RIVAL = 12.0  # deviance within which two sets of effects cannot be told apart
+_CONTENDER = 0.45  # share of the best expected gain that earns a refit
+_NEAR = 40.0  # or this little behind it
+_MOST_REFITS = (5, 4, 3, 3)
+QUICK = 9  # trials that refits are tried on before all are asked
+
+# effects that act much alike: a member that is well behind in the screen is refitted all the same
+LOOK_ALIKES = (
+    {"dead_time", "clock_offset"},
+    {"curvature_bias", "segment_bias", "single_wheel_toe", "wheel_toe"},
+    {"floor_slope", "tether_pull"},
+    {"tether_drag", "tether_viscous", "tether_weight"},
+    {"camera_scale", "gap_length"},
+    {"hysteresis", "fill_exhaust_asymmetry"},
+    {"curvature_stiffening", "supply_droop", "bending_resistance"},
+    {"viscous_rolling", "stribeck", "slip_rate"},
+)
+Report = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Examined:
+    """A hypothesis with its tests.
+
+    Attributes
+    ----------
+    hypothesis : Hypothesis
+    linearisation : Linearisation
+        Over all candidates and the residual functions.
+    detection : Detection
+        Of what is left.
+    groups : tuple of Group
+    scores : tuple of Score
+        What adding each candidate would gain.
+    """
+
+    hypothesis: Hypothesis
+    linearisation: Linearisation
+    detection: Detection
+    groups: tuple[Group, ...]
+    scores: tuple[Score, ...]
+
+    @property
+    def adequate(self) -> bool:
+        """Whether nothing is left beyond noise and scatter."""
+        return self.detection.p_value > ADEQUATE
+
+
+class Search:
+    """What every step of the search needs.
+
+    Parameters
+    ----------
+    experiment : Experiment
+    base : sequence of Coordinate
+    candidates : sequence of Candidate
+    trials : sequence of Trial
+        The open ones.
+    """
+
+    def __init__(
+        self,
+        experiment: Experiment,
+        base: Sequence[Coordinate],
+        candidates: Sequence[Candidate],
+        trials: Sequence[Trial],
+        seed: int = 0,
+        report: Report | None = None,
+    ) -> None:
+        self.experiment, self.base = experiment, tuple(base)
+        self.candidates, self.trials = tuple(candidates), tuple(trials)
+        self.functions = ResidualFunctions.of(self.trials)
+        self.seed = seed
+        self._report = report or (lambda message: None)
+        self.quick = self.trials
+        if len(self.trials) > QUICK:
+            few = spread(self.trials, QUICK, np.random.default_rng([seed, 29]))
+            self.quick = tuple(t for t in self.trials if t in few)
+        self._fits: dict[tuple[frozenset[str], int], Hypothesis] = {}
+
+    @property
+    def fitted(self) -> list[Hypothesis]:
+        """Return what was fitted to all open trials."""
+        return [h for (_, count), h in self._fits.items() if count == len(self.trials)]
+
+    @property
+    def tried(self) -> set[str]:
+        """Labels of everything that was refitted, also to a part of the trials."""
+        return {h.label for h in self._fits.values()}
+
+    def fit(
+        self,
+        candidates: Sequence[Candidate],
+        start: Point,
+        iterations: int = ITERATIONS,
+        beat: float = math.inf,
+        trials: Sequence[Trial] | None = None,
+    ) -> Hypothesis | None:
+        """Fit a set of effects; None where the motion cannot be simulated."""
+        trials = self.trials if trials is None else trials
+        key = (frozenset(c.label for c in candidates), len(trials))
+        known = self._fits.get(key)
+        if known is not None and known.fit.converged:
+            return known
+        label = " + ".join(c.label for c in candidates)
+        self._report(f"refit on {len(trials)} trials: {label}" if label else "calibration alone")
+        try:
+            found = fit_hypothesis(self.experiment, self.base, candidates, start, trials, iterations, beat)
+        except NoAnswerError:
+            return None
+        if known is None or found.deviance < known.deviance:
+            self._fits[key] = found
+        return self._fits[key]
+
+    def examine(self, hypothesis: Hypothesis) -> Examined:
+        """Linearise about a fitted hypothesis, test what is left and screen what could explain it."""
+        fit = hypothesis.fit
+        lin = self._linearise(fit)
+        groups = self.functions.groups()
+        size, columns = len(lin.coordinates), next(iter(lin.grams.values())).raw.shape[0] - 1
+        total = sum_eliminated(lin.grams, 1.0)
+        precision, offset = priors(lin.coordinates[: lin.fitted], lin.point)
+        score, covariance = project(total, range(lin.fitted), range(lin.fitted, columns), precision, offset)
+        further = [[lin.column(c.name) - lin.fitted for c in k.sizes] for k in self.candidates]
+        tested = [g for g in further if min(g) >= 0]
+        start = size - lin.fitted
+        families = [[start + k for k in g.columns] for g in groups] + tested
+        serial = np.array([g.serial for g in lin.grams.values() if g.scattered])
+        rng = np.random.default_rng([self.seed, 17])
+        detection = detect(score, covariance, families, serial, rng)
+        return Examined(hypothesis, lin, detection, groups, tuple(screen(lin, self.candidates)))
+
+    def _linearise(self, fit: Fit) -> Linearisation:
+        names = {c.name for c in fit.coordinates}
+        others = [c for k in self.candidates for c in k.sizes if c.name not in names]
+        coordinates = (*fit.coordinates, *others)
+        point = Point({**{c.name: 0.0 for c in others}, **fit.point.values}, fit.point.scatter)
+        grams = self.experiment.grams(point, coordinates, self.trials, self.functions)
+        return Linearisation(coordinates, len(fit.coordinates), point, grams, fit.temper)
+
+    def significant(self, score: Score) -> bool:
+        """Whether a gain is too large for chance among all candidates."""
+        return score.improvement > needed_gain(score.candidate, len(self.candidates))
+
+    def run(self, null: Examined) -> tuple[Examined, list[Hypothesis]]:
+        """Return the best set of effects, examined, and everything that was refitted."""
+        current = null
+        for _ in range(ROUNDS):
+            depth = len(current.hypothesis.candidates)
+            if depth >= DEEPEST:
+                break
+            better = self._refit(current, self._proposals(current, depth), _MOST_REFITS[depth])
+            better = self._swapped(current, better)
+            if better is None or not self._worth(better, current.hypothesis):
+                break
+            current = self._pruned(self.examine(better))
+            if current.adequate:
+                break
+        return current, self.fitted
+
+    def _swapped(self, current: Examined, added: Hypothesis | None) -> Hypothesis | None:
+        """Return the better of `added` and the best exchange of one effect for another."""
+        lin, have = current.linearisation, current.hypothesis.candidates
+        best = added
+        for dropped in have:
+            others = [k for k in self.candidates if k not in have]
+            scores = screen(lin, others, dropped=(dropped,))
+            if not scores or not self.significant(scores[0]):
+                continue
+            start = expected_start(lin, scores[0])
+            rest = tuple(c for c in have if c is not dropped)
+            beat = current.hypothesis.deviance if best is None else best.deviance
+            swapped = self.fit((*rest, scores[0].candidate), start, beat=beat)
+            if swapped is not None and (best is None or _cost(swapped) < _cost(best)):
+                best = swapped
+        return best
+
+    def _proposals(self, current: Examined, depth: int) -> list[Score]:
+        """Return the candidates that deserve a refit, best first."""
+        scores = [
+            s
+            for s in current.scores
+            if self.significant(s) or s.improvement * current.linearisation.temper > 60
+        ]
+        if not scores:
+            return []
+        best = scores[0].improvement
+        limit = min(_CONTENDER * best, max(best - _NEAR, 0.25 * best))
+        chosen = [s for s in scores if s.improvement >= limit]
+        classes = [c for c in LOOK_ALIKES if scores[0].candidate.effect in c]
+        for s in scores:
+            alike = any(s.candidate.effect in c for c in classes)
+            if s not in chosen and alike and s.improvement > 0.2 * best and depth == 0:
+                chosen.append(s)
+        return chosen
+
+    def _refit(self, current: Examined, proposals: list[Score], most: int) -> Hypothesis | None:
+        """Refit proposals on some of the trials, best first; return the best fit to all of them."""
+        found: list[Hypothesis] = []
+        have = current.hypothesis.candidates
+        for score in proposals[: 2 * most]:
+            start = expected_start(current.linearisation, score)
+            beat = min((h.deviance for h in found), default=math.inf)
+            hypothesis = self.fit((*have, score.candidate), start, beat=beat, trials=self.quick)
+            if hypothesis is not None:
+                found.append(hypothesis)
+            settled = found and min(h.fit.misfit_ratio for h in found) < 1.02
+            if len(found) >= most and (settled or len(found) >= 2 * most):
+                break
+        if not found:
+            return None
+        found.sort(key=_cost)
+        near = [h for h in found if _cost(h) < _cost(found[0]) + 2 * RIVAL]
+        whole = [self.fit(h.candidates, h.fit.point) for h in near]
+        return min((h for h in whole if h is not None), key=_cost, default=None)
+
+    def _worth(self, better: Hypothesis, current: Hypothesis) -> bool:
+        gain = current.deviance - better.deviance
+        return gain > needed_gain(better.candidates[-1], len(self.candidates))
+
+    def _pruned(self, current: Examined) -> Examined:
+        """Drop effects that turn out to be superfluous, or too small to be themselves, beside the others."""
+        have = current.hypothesis.candidates
+        if len(have) < 2:
+            return current
+        small = [c for c in have if current.hypothesis.relative_size(c) < SMALL]
+        if small and len(small) < len(have):
+            rest = tuple(c for c in have if c not in small)
+            smaller = self.fit(rest, current.hypothesis.fit.point)
+            return current if smaller is None else self._pruned(self.examine(smaller))
+        for dropped in have[:-1]:
+            rest = tuple(c for c in have if c is not dropped)
+            allowed = needed_gain(dropped, len(self.candidates))
+            beat = current.hypothesis.deviance + allowed
+            smaller = self.fit(rest, current.hypothesis.fit.point, beat=beat)
+            if smaller is not None and smaller.deviance < beat:
+                return self._pruned(self.examine(smaller))
+        return current
+
+
+def _cost(hypothesis: Hypothesis) -> float:
+    return hypothesis.deviance + 2 * hypothesis.parameters
+
+
+def needed_gain(candidate: Candidate, family: int) -> float:
+    """Return the drop of the deviance that the best of `family` candidates reaches by chance once in 500."""
+    from scipy import stats
+
+    return float(stats.chi2.isf(FALSE_NAME / max(family, 1), len(candidate.coordinates)))

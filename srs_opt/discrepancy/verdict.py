@@ -1,0 +1,59 @@
+"""Step 9: what may be said."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from srs_opt.discrepancy.locate import odd_trials
+from srs_opt.discrepancy.seal import Gap
+from srs_opt.discrepancy.search import ADEQUATE, Examined
+from srs_opt.discrepancy.select import Selection
+
+DETECTED = 0.05
+NO_GAP, NAMED, ONE_OF, UNKNOWN, NOT_TESTABLE = "no_gap", "named", "one_of", "unknown", "not_testable"
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The word, and the sentence that says why."""
+
+    word: str
+    why: str
+
+
+def judge(null: Examined, best: Examined, selection: Selection | None, gap: Gap | None) -> Verdict:
+    """Return the verdict; every doubt counts against a name."""
+    p = null.detection.p_value
+    if p >= DETECTED:
+        return Verdict(
+            NO_GAP, f"calibration alone explains the data (p = {p:.2g}); nothing is missing that they show"
+        )
+    if selection is None or not selection.best.candidates:
+        odd = odd_trials(null)
+        what = f"trial {', '.join(odd)} contradicts the others" if odd else "no known effect explains it"
+        return Verdict(UNKNOWN, f"there is a gap (p = {p:.2g}), but {what}")
+    label = " + ".join(selection.best.names)
+    odd = odd_trials(best)
+    if not best.adequate and odd:
+        return Verdict(
+            UNKNOWN, f"even with {label}, trial {', '.join(odd)} contradicts the others: look at it first"
+        )
+    if not best.adequate:
+        left = best.detection.p_value
+        return Verdict(
+            UNKNOWN,
+            f"the best known explanation ({label}) leaves a gap (p = {left:.2g}, limit {ADEQUATE:g}): "
+            "something else is at work",
+        )
+    against = selection.best.implausible()
+    if against:
+        return Verdict(UNKNOWN, f"the best known explanation ({label}) is not plausible: {against}")
+    if gap is not None and gap.ratio is not None and not gap.passed:
+        return Verdict(
+            UNKNOWN,
+            f"{label} fits the open trials but closes only {1 - gap.ratio:.0%} of the gap on the sealed ones",
+        )
+    if selection.rivals:
+        names = " or ".join(" + ".join(h.names) for h in (selection.best, *selection.rivals))
+        return Verdict(ONE_OF, f"the data cannot tell between {names}")
+    return Verdict(NAMED, f"{label} explains the gap, and nothing else known does")
