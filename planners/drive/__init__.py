@@ -1,0 +1,1 @@
+"""Driving a plan closed-loop on the dynamic model: tracking, contact, stopping."""

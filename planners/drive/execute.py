@@ -1,0 +1,223 @@
+"""Drive a plan closed-loop on the full dynamic model, a cycle at a time, until arrival, contact or a stop."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planners.drive.contact import BodyWatch
+from planners.drive.track import Learned, Where, choose, nearest_node, reference_of
+from planners.motion.robots import undelayed
+from planners.plan.answer import Plan
+from planners.plan.solve import solve_with_lattice
+from planners.search.lattice import Root
+from planners.search.problem import ROUNDING_M, Problem
+from srs_opt.errors import InputError, NoAnswerError
+from srs_opt.model.parameters import valve_delay_s
+from srs_opt.robot import Robot
+from srs_opt.simulate.integrate import Integrator
+from srs_opt.simulate.rosenbrock import BODY_STATES
+from srs_opt.simulate.timeline import Timeline
+
+Array = NDArray[np.float64]
+ASTRAY_M = 0.06  # farther from the plan than this: plan anew
+STOP_CLEARANCE_M = -0.004  # a cycle predicted to run deeper into a wall than this is not begun
+COAST_S = 1.5  # watched after a stop
+MOST_IDLE = 4  # cycles without progress along the plan
+MOST_REPLANS = 8
+REPLAN_CYCLES = 4000  # looked at when planning anew
+PATIENCE = 3.0  # times the plan's cycles
+
+
+@dataclass(frozen=True)
+class Execution:
+    """What happened when the plan was driven.
+
+    Attributes
+    ----------
+    reached : bool
+    collisions : int
+        Contacts of the body with walls; the drive ends with the first.
+    smallest_clearance_m, final_error_m, duration_s : float
+        Nearest the body came to a wall; distance of the centre of mass from the goal at the end; time.
+    replans : int
+    gaits : tuple of int
+        Played, a cycle each.
+    reason : str
+        Why it ended, in words.
+    time_s, pose, lines : arrays (n,), (n, 3), (n, points, 2)
+        The motion, body included.
+    """
+
+    reached: bool
+    collisions: int
+    smallest_clearance_m: float
+    final_error_m: float
+    duration_s: float
+    replans: int
+    gaits: tuple[int, ...]
+    reason: str
+    time_s: Array
+    pose: Array
+    lines: Array
+
+    def to_record(self) -> dict[str, Any]:
+        """Return the `execution` entry of the command's JSON."""
+        return {
+            "reached": self.reached,
+            "collisions": self.collisions,
+            "smallest_clearance_m": round(self.smallest_clearance_m, 6),
+            "final_error_m": round(self.final_error_m, 6),
+            "duration_s": round(self.duration_s, 4),
+            "replans": self.replans,
+            "cycles": len(self.gaits),
+            "reason": self.reason,
+        }
+
+
+def execute(
+    problem: Problem,
+    plan: Plan,
+    true_robot: Robot | None = None,
+    tell: Callable[[str], None] = lambda message: None,
+) -> Execution:
+    """Drive `plan` on the dynamic model of `true_robot` (default: the planned robot).
+
+    Raises
+    ------
+    InputError
+        If the true robot cannot play the gaits.
+    """
+    robot = true_robot or problem.robot
+    if robot.segments != problem.robot.segments:
+        raise InputError(
+            f"--true-robot '{robot.name}' has {robot.links} links, the plan is for {problem.robot.links}"
+        )
+    return _Drive(problem, plan, robot, tell).go()
+
+
+class _Drive:
+    """One drive: the robot's state, the plan being followed, what was learned."""
+
+    def __init__(self, problem: Problem, plan: Plan, robot: Robot, tell: Callable[[str], None]) -> None:
+        self.problem, self.tell = problem, tell
+        # commands reach the valves late by a constant: it is waited once, before the first cycle
+        self.run = Integrator(undelayed(robot), problem.gaits.model)
+        self.watch = BodyWatch(problem, robot, self.run)
+        self.delay_s = valve_delay_s(robot)
+        start = problem.start
+        self.state = self.run.rest(start.x, start.y, start.heading)
+        self.before = problem.motion.rest
+        self.learned = Learned()
+        self.replans = 0
+        self.played: list[int] = []
+        self._follow(plan)
+        self.most_cycles = 20 + math.ceil(PATIENCE * len(plan.gaits))
+
+    def _follow(self, plan: Plan) -> None:
+        self.reference = reference_of(self.problem, plan)
+        self.node = self.idle = 0
+
+    def go(self) -> Execution:
+        """Drive until something ends it."""
+        self.watch.look(np.zeros(1), self.state[None, :3], np.zeros((1, self.problem.robot.segments)))
+        while len(self.played) < self.most_cycles:
+            gait = self._next_gait()
+            if gait is None:
+                return self._stop("no gait keeps the body off the walls and no other way was found")
+            outcome = self._cycle(gait)
+            if outcome is not None:
+                return self._done(outcome)
+        return self._stop(f"the goal was not reached within {self.most_cycles} cycles")
+
+    def _next_gait(self) -> int | None:
+        where = Where(self.state[:3].copy(), self.before, float(self.state[3]))
+        choice = choose(self.problem, self.reference, where, self.learned, self.node)
+        lost = choice.astray_m > ASTRAY_M or self.idle >= MOST_IDLE
+        if (lost or choice.clearance_m < STOP_CLEARANCE_M) and self.replans < MOST_REPLANS:
+            self.replans += 1
+            why = "strayed or stuck" if lost else "nothing fits"
+            self.tell(f"cycle {len(self.played)}: {why}, planning anew")
+            if self._plan_anew():
+                choice = choose(self.problem, self.reference, where, self.learned, self.node)
+        if choice.clearance_m < STOP_CLEARANCE_M:
+            return None
+        self.predicted = choice.displacement
+        return choice.gait
+
+    def _plan_anew(self) -> bool:
+        """Look for a way from here; the model takes over place, speed and curvature."""
+        n = self.problem.robot.segments
+        state = self.problem.run.rest()
+        state[:6] = self.state[:6]
+        state[BODY_STATES : BODY_STATES + 2 * n] = self.state[BODY_STATES : BODY_STATES + 2 * n]
+        # half the margin is asked for on the way, and where the robot is now, no more than it has
+        relaxed = replace(self.problem, margin_m=self.problem.margin_m / 2)
+        slack = min(0.0, self.watch.now_m - relaxed.margin_m) - ROUNDING_M
+        try:
+            result = solve_with_lattice(
+                relaxed, root=Root(state, self.before, slack), time_limit_s=20.0, max_nodes=REPLAN_CYCLES
+            )
+        except NoAnswerError:
+            return False
+        if result.plan is None:
+            return False
+        self._follow(result.plan)
+        return True
+
+    def _cycle(self, index: int) -> str | None:
+        """Play one cycle; return what ended the drive, if anything."""
+        gait = self.problem.gaits.gaits[index].gait
+        begin = self.state[:3].copy()
+        trajectory = self.run.run(Timeline.of_gait(gait, gait.period_s), self.state)
+        arrived = self.watch.look(trajectory.time_s, trajectory.pose, trajectory.kappa)
+        self.state = trajectory.final
+        self.played.append(index)
+        self.before = index
+        if self.watch.touched:
+            return "contact"
+        if arrived:
+            return "arrived"
+        c, s = math.cos(begin[2]), math.sin(begin[2])
+        dx, dy, turn = self.state[:3] - begin
+        observed = np.array([c * dx + s * dy, c * dy - s * dx, turn])
+        self.learned = self.learned.update(self.predicted, observed, gait.period_s)
+        node = nearest_node(self.reference, self.state[:3], self.node)
+        self.idle = 0 if node > self.node else self.idle + 1
+        self.node = node
+        return None
+
+    def _stop(self, reason: str) -> Execution:
+        """Vent all chambers and watch the robot roll out."""
+        vent = Timeline.vent(self.problem.robot.segments, COAST_S, 0.0)
+        trajectory = self.run.run(vent, self.state)
+        self.watch.look(trajectory.time_s, trajectory.pose, trajectory.kappa, ends=False)
+        return self._done(reason)
+
+    def _done(self, outcome: str) -> Execution:
+        w = self.watch
+        time, pose, lines = w.record()
+        reached = outcome == "arrived"
+        reason = {
+            "arrived": "arrived",
+            "contact": f"the body touched a wall at {w.where_touched}, {time[-1]:.1f} s after the start",
+        }.get(outcome, f"stopped: {outcome}" + (" (it touched a wall rolling out)" if w.touched else ""))
+        error = 0.0 if reached else float(self.problem.goal.distance(pose[-1, :2]))
+        return Execution(
+            reached and not w.touched,
+            int(w.touched),
+            w.smallest_m,
+            error,
+            float(time[-1]) + self.delay_s,
+            self.replans,
+            tuple(self.played),
+            reason,
+            time,
+            pose,
+            lines,
+        )

@@ -1,0 +1,223 @@
+"""Which gait next: a few cycles are rolled out over the gait table, the best first one is played.
+
+The predictor learns as it drives: how much farther or shorter than predicted a cycle goes, and how much
+the robot turns by itself. That is what a robot with other friction, a tether or a bent segment shows.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planners.motion.table import SAMPLES, body_in_room
+from planners.plan.answer import Plan
+from planners.search.lattice import arrival_index
+from planners.search.problem import Problem
+
+Array = NDArray[np.float64]
+PLACE_M, COURSE_RAD, SPEED_M_S = 0.02, 0.15, 0.35  # deviations that cost one unit each
+UNIT_S = 0.5  # time that costs one unit
+AIR_M, AIR_UNITS = 0.015, 4.0  # below this clearance it costs, up to so many units at contact
+CONTACT_M, CONTACT_UNITS = 0.0005, 100.0
+CHANGE_UNITS = 0.05
+HORIZON, BEAM = 3, 5
+NODES_PER_CYCLE = 6
+BEYOND_M = 0.12  # past the goal
+LEARNING = 0.3
+_THIN = 3  # every third sample of a cycle is looked at
+
+
+class Reference(NamedTuple):
+    """The plan as nodes: place and course (n, 3), speed (n,), time to go (n,)."""
+
+    pose: Array
+    speed_m_s: Array
+    left_s: Array
+
+
+@dataclass(frozen=True)
+class Learned:
+    """How the driven robot differs from the table: stretch of a cycle's way, turn of its own (rad/s)."""
+
+    stretch: float = 1.0
+    drift_rad_s: float = 0.0
+
+    def apply(self, local: Array, period_s: Array | float) -> Array:
+        """Correct poses (..., SAMPLES + 1, 3) in the frame of a cycle's start."""
+        turned = self.drift_rad_s * np.asarray(period_s)[..., None] * np.linspace(0, 1, local.shape[-2])
+        c, s = np.cos(turned / 2), np.sin(turned / 2)
+        x, y = self.stretch * local[..., 0], self.stretch * local[..., 1]
+        return np.stack([c * x - s * y, s * x + c * y, local[..., 2] + turned], axis=-1)
+
+    def update(self, predicted: Array, observed: Array, period_s: float) -> Learned:
+        """Learn from one cycle's predicted (corrected) and observed displacement, (3,) each."""
+        far = math.hypot(predicted[0], predicted[1])
+        stretch = self.stretch
+        if far > 0.02:
+            along = float(observed[:2] @ predicted[:2]) / far**2
+            stretch *= 1 + LEARNING * (min(max(along, 0.5), 1.5) - 1)
+        drift = self.drift_rad_s + LEARNING * float(observed[2] - predicted[2]) / period_s
+        return Learned(min(max(stretch, 0.5), 1.5), min(max(drift, -1.0), 1.0))
+
+
+@dataclass(frozen=True)
+class Where:
+    """The measured state at a cycle's end: place, gait before, forward speed."""
+
+    pose: Array
+    gait: int
+    speed_m_s: float
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The gait to play, what it should do, and how well it keeps to the plan.
+
+    Attributes
+    ----------
+    gait : int
+    displacement : array (3,)
+        Predicted, in the frame of the cycle's start.
+    clearance_m : float
+        Predicted for this cycle.
+    astray_m : float
+        Distance from the plan after the horizon.
+    """
+
+    gait: int
+    displacement: Array
+    clearance_m: float
+    astray_m: float
+
+
+@dataclass(frozen=True)
+class _Branch:
+    where: Where
+    cost: float  # of the cycles so far
+    ahead: float  # of what remains: deviation from the plan and time to go
+    first: Choice | None
+    arrived: bool = False
+
+
+def reference_of(problem: Problem, plan: Plan) -> Reference:
+    """Return the plan's nodes; the course is the direction of travel, free of the gait's swing."""
+    c = plan.certificate
+    periods = problem.motion.period_s[list(plan.gaits)]
+    ends = np.concatenate([[0.0], np.cumsum(periods)])
+    gaits = [problem.motion.rest, *plan.gaits]
+    heading = np.interp(ends, c.time_s, c.pose[:, 2])
+    course = heading + problem.motion.course[gaits]
+    course[-1] = course[-2] if c.time_s[-1] < ends[-1] - 1e-6 else course[-1]
+    count = max(2, NODES_PER_CYCLE * len(plan.gaits))
+    times = np.linspace(0.0, c.time_s[-1], count)
+    x, y = (np.interp(times, c.time_s, c.pose[:, k]) for k in range(2))
+    speed = np.append(np.hypot(np.diff(x), np.diff(y)) / np.diff(times), np.nan)
+    speed[-1] = speed[-2]
+    backwards = np.array([problem.motion.steady_speed_m_s[g] < 0 for g in plan.gaits])
+    cycle = np.minimum(np.searchsorted(ends, times, side="right") - 1, len(plan.gaits) - 1)
+    speed = np.where(backwards[cycle], -speed, speed)
+    pose = np.stack([x, y, np.interp(times, ends, course)], axis=1)
+    return _beyond(Reference(pose, speed, c.time_s[-1] - times))
+
+
+def _beyond(reference: Reference) -> Reference:
+    """Return the reference drawn out straight past its end, so that the goal is driven through."""
+    x, y, course = reference.pose[-1]
+    speed = float(reference.speed_m_s[-1])
+    far = math.copysign(1.0, speed) * np.linspace(0.0, BEYOND_M, 6)[1:]
+    line = np.stack(
+        [x + far * math.cos(course), y + far * math.sin(course), np.full(far.size, course)], axis=1
+    )
+    later = -np.abs(far) / max(abs(speed), 0.1)
+    return Reference(
+        np.concatenate([reference.pose, line]),
+        np.append(reference.speed_m_s, np.full(far.size, speed)),
+        np.append(reference.left_s, later),
+    )
+
+
+def choose(
+    problem: Problem, reference: Reference, where: Where, learned: Learned, step: int | None = None
+) -> Choice:
+    """Return the best gait for the next cycle.
+
+    `step` is the reference's node that the robot has come to; only nodes near it are looked at, so that
+    a plan that crosses itself is followed in order.
+    """
+    window = slice(None) if step is None else slice(max(step - 12, 0), step + 5 * NODES_PER_CYCLE)
+    near = Reference(reference.pose[window], reference.speed_m_s[window], reference.left_s[window])
+    beam = [_Branch(where, 0.0, 0.0, None)]
+    for _ in range(HORIZON):
+        grown = [
+            new for old in beam for new in ([old] if old.arrived else _grow(problem, near, old, learned))
+        ]
+        grown.sort(key=lambda branch: branch.cost + branch.ahead)
+        beam = grown[:BEAM]
+    best = beam[0]
+    assert best.first is not None  # every branch has grown
+    offset = near.pose[:, :2] - best.where.pose[:2]
+    return replace(best.first, astray_m=float(np.hypot(*offset.T).min()))
+
+
+def nearest_node(reference: Reference, pose: Array, after: int) -> int:
+    """Return the node nearest to a place, not before `after` and not far beyond it."""
+    window = reference.pose[after : after + 4 * NODES_PER_CYCLE, :2]
+    return after + int(np.hypot(*(window - pose[:2]).T).argmin())
+
+
+def _grow(problem: Problem, reference: Reference, branch: _Branch, learned: Learned) -> list[_Branch]:
+    """Return the branch with every gait played after it, the best few."""
+    motion, where = problem.motion, branch.where
+    move = motion.move(0.0, 0.0, 0.0, where.gait, where.speed_m_s)
+    local = learned.apply(move.pose, motion.period_s)
+    c, s = math.cos(where.pose[2]), math.sin(where.pose[2])
+    pose = np.stack(
+        [
+            where.pose[0] + c * local[..., 0] - s * local[..., 1],
+            where.pose[1] + s * local[..., 0] + c * local[..., 1],
+            where.pose[2] + local[..., 2],
+        ],
+        axis=-1,
+    )
+    speed = move.speed_m_s * learned.stretch
+    place = np.concatenate([pose[:, -1, :2], (pose[:, -1, 2] + motion.course[:-1])[:, None]], axis=1)
+    offset = _offset(reference, place, speed)
+    order = np.argsort(offset, kind="stable")[: 3 * BEAM]
+    lines = body_in_room(motion.body[where.gait, order, 1::_THIN], pose[order, 1::_THIN])
+    room = _room(problem, lines)
+    grown = []
+    for gait, clearance in zip(map(int, order), map(float, room)):
+        arrival = arrival_index(problem.goal, pose[gait])
+        part = 1.0 if arrival is None else arrival / SAMPLES
+        lack = min(max(1 - clearance / AIR_M, 0.0), 1.0)
+        cost = branch.cost + AIR_UNITS * lack**2 + CHANGE_UNITS * (gait != where.gait)
+        cost += part * float(motion.period_s[gait]) / UNIT_S
+        cost += CONTACT_UNITS * (1 + lack) if clearance <= CONTACT_M else 0.0
+        first = branch.first or Choice(gait, local[gait, -1], clearance, 0.0)
+        after = Where(pose[gait, -1], gait, float(speed[gait]))
+        ahead = float(offset[gait]) if arrival is None else 0.0
+        grown.append(_Branch(after, cost, ahead, first, arrival is not None))
+    return grown
+
+
+def _room(problem: Problem, lines: Array) -> Array:
+    """Return the clearance (gaits,) of bodies (gaits, samples, points, 2), exact where it is small."""
+    flat = lines.reshape(-1, *lines.shape[2:])
+    room = problem.body.estimate(flat)
+    close = room < AIR_M + problem.field.error_m
+    if close.any():
+        room[close] = problem.body.exact(flat[close])
+    return np.asarray(room.reshape(lines.shape[:2]).min(axis=1))
+
+
+def _offset(reference: Reference, place: Array, speed: Array) -> Array:
+    """Return what places (n, 3) with speeds (n,) cost: deviation from the plan and time to go."""
+    dx, dy, turn = (place[:, None, :] - reference.pose[None]).transpose(2, 0, 1)
+    turn = (turn + math.pi) % (2 * math.pi) - math.pi
+    off = (dx**2 + dy**2) / PLACE_M**2 + (turn / COURSE_RAD) ** 2
+    off = off + ((speed[:, None] - reference.speed_m_s) / SPEED_M_S) ** 2
+    return np.asarray((off + reference.left_s / UNIT_S).min(axis=1))

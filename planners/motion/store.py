@@ -1,0 +1,87 @@
+"""The motion table on disk: the built-in robot's comes with the package, others are made once and cached."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import zipfile
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+
+from planners.motion.table import SAMPLES, MotionTable
+from planners.motion.transitions import (
+    LEVELS,
+    STEP_S,
+    Progress,
+    Transitions,
+    motion_table,
+    simulate_transitions,
+)
+from srs_opt.files import atomic_path
+from srs_opt.gait_opt.table import GaitTable
+from srs_opt.robot import Robot
+from srs_opt.simulate.compiled import cache_folder
+
+SHIPPED = "shipped"
+_POSE_STEP = 1e-4  # m and rad: below the error of interpolation, and finer digits do not compress
+
+
+def table_key(robot: Robot, table: GaitTable) -> str:
+    """Return a hash of everything that the motion table depends on, but for the model's own equations."""
+    gaits = [
+        (e.gait.period_s, e.gait.pressure_kpa, e.gait.intervals, list(e.displacement)) for e in table.gaits
+    ]
+    parts = json.dumps([robot.fingerprint(), table.model, LEVELS, SAMPLES, STEP_S, gaits], sort_keys=True)
+    return hashlib.sha256(parts.encode()).hexdigest()[:16]
+
+
+def load_motion(robot: Robot, table: GaitTable, progress: Progress = iter) -> MotionTable:
+    """Return the motion table: shipped, cached, or simulated now (about half a minute) and then cached."""
+    key = table_key(robot, table)
+    shipped = resources.files("planners.motion") / SHIPPED / f"{key}.npz"
+    cached = cache_folder() / f"motion_{key}_{_equations_digest()}.npz"
+    transitions = None
+    for place in (Path(str(shipped)), cached):
+        transitions = transitions or _read(place)
+    if transitions is None:
+        transitions = simulate_transitions(robot, table, progress)
+        write_transitions(cached, transitions)
+    return motion_table(robot, table, transitions)
+
+
+def write_transitions(path: Path, transitions: Transitions) -> Path:
+    """Write simulated transitions as a compressed archive, atomically."""
+    rounded = {
+        name: (np.round(value / _POSE_STEP) * _POSE_STEP).astype(value.dtype)
+        for name, value in transitions._asdict().items()
+        if name != "kappa"
+    }
+    kappa = np.round(transitions.kappa, 3).astype(np.float32)
+    with atomic_path(path) as temporary:
+        np.savez_compressed(temporary, kappa=kappa, **rounded)
+    return path
+
+
+def _read(path: Path) -> Transitions | None:
+    """Return the stored transitions, or None where there is no file or a broken one (it is made again)."""
+    try:
+        # by way of memory: numpy leaves the file open when the archive is broken
+        with np.load(io.BytesIO(path.read_bytes())) as stored:
+            return Transitions(*(stored[name] for name in Transitions._fields))
+    except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile):
+        return None
+
+
+def _equations_digest() -> str:
+    """Return a hash of the sources that make the model's motion."""
+    import srs_opt
+
+    digest = hashlib.sha256()
+    package = Path(srs_opt.__file__).parent
+    for folder in ("model", "simulate"):
+        for file in sorted((package / folder).rglob("*.py")):
+            digest.update(file.read_bytes())
+    return digest.hexdigest()[:8]

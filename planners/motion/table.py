@@ -1,0 +1,136 @@
+"""The motion table: where a cycle leads, and where the body is meanwhile, by lookup."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+SAMPLES = 16  # intervals per cycle at which pose and body are kept
+
+Array = NDArray[np.float64]
+
+
+class Motion(NamedTuple):
+    """What one cycle does, for several gaits at once, from one state.
+
+    Attributes
+    ----------
+    pose : array (gaits, SAMPLES + 1, 3)
+        Centre of mass and mean heading over the cycle, in the room.
+    speed_m_s : array (gaits,)
+        Forward speed at the cycle's end.
+    """
+
+    pose: Array
+    speed_m_s: Array
+
+
+@dataclass(frozen=True)
+class MotionTable:
+    """Motion of every gait after every gait, n gaits.
+
+    Attributes
+    ----------
+    names : tuple of str
+    period_s : array (n,)
+    steady : array (n, 3)
+        Displacement per cycle in the steady state, in the frame of the cycle's start.
+    speed_m_s : array (n + 1, levels)
+        Forward speeds at the end of a cycle for which the table holds; the last row is rest.
+    speed_after_m_s : array (n + 1, n, levels)
+        Forward speed after a cycle of the second gait, begun at those speeds.
+    pose : array (n + 1, n, levels, SAMPLES + 1, 3)
+        Poses over that cycle, in the frame of its start.
+    body : array (n + 1, n, SAMPLES + 1, points, 2)
+        Centre line over that cycle in the robot's frame, tail to head.
+    body_width_m : float
+    """
+
+    names: tuple[str, ...]
+    period_s: Array
+    steady: Array
+    speed_m_s: Array
+    speed_after_m_s: NDArray[np.float32]
+    pose: NDArray[np.float32]
+    body: NDArray[np.float32]
+    body_width_m: float
+
+    @property
+    def rest(self) -> int:
+        """Row of the robot at rest, straight."""
+        return len(self.names)
+
+    @property
+    def size(self) -> int:
+        """Number of gaits."""
+        return len(self.names)
+
+    def move(self, x: float, y: float, heading: float, before: int, speed_m_s: float) -> Motion:
+        """Return what a cycle of each gait does from one state, (gaits, ...)."""
+        low, weight = self._level(before, speed_m_s)
+        tables = self.pose[before], self.speed_after_m_s[before]
+        local, after = ((1 - weight) * t[:, low] + weight * t[:, low + 1] for t in tables)
+        return Motion(placed(local, x, y, heading), after)
+
+    def move_one(
+        self, x: float, y: float, heading: float, before: int, speed_m_s: float, now: int
+    ) -> tuple[Array, float]:
+        """Return poses (SAMPLES + 1, 3) and the speed after one cycle of gait `now`."""
+        low, weight = self._level(before, speed_m_s)
+        tables = self.pose[before, now], self.speed_after_m_s[before, now]
+        local, after = ((1 - weight) * t[low] + weight * t[low + 1] for t in tables)
+        return placed(local, x, y, heading), float(after)
+
+    def _level(self, before: int, speed_m_s: float) -> tuple[int, float]:
+        levels = self.speed_m_s[before]
+        low = int(np.searchsorted(levels, speed_m_s)) - 1
+        low = min(max(low, 0), levels.size - 2)
+        weight = (speed_m_s - levels[low]) / (levels[low + 1] - levels[low])
+        return low, float(min(max(weight, -0.5), 1.5))
+
+    def bodies(self, before: int, now: NDArray[np.int64] | slice, pose: Array) -> Array:
+        """Return centre lines in the room, (gaits, SAMPLES + 1, points, 2), for poses of the same gaits."""
+        return body_in_room(self.body[before, now], pose)
+
+    @cached_property
+    def course(self) -> Array:
+        """Angle from the mean heading to the path's direction at the cycle's end, per gait and rest (n + 1,).
+
+        The mean heading swings within a cycle; the direction of travel in the steady state is the chord of
+        a cycle less half its turn. Gaits that back up point against their heading.
+        """
+        dx, dy, turn = self.steady.T
+        backwards = self.steady_speed_m_s < 0
+        chord = np.arctan2(np.where(backwards, -dy, dy), np.where(backwards, -dx, dx))
+        moving = np.hypot(dx, dy) > 0.01
+        return np.append(np.where(moving, chord - turn / 2, 0.0), 0.0)
+
+    @cached_property
+    def steady_speed_m_s(self) -> Array:
+        """Mean speed of each gait in the steady state, negative backwards (n,)."""
+        dx, dy, _ = self.steady.T
+        forward = np.where(dx >= 0, 1.0, -1.0)
+        return np.asarray(forward * np.hypot(dx, dy) / self.period_s)
+
+
+def placed(local: Array, x: float, y: float, heading: float) -> Array:
+    """Move poses (..., 3) from the frame of a cycle's start to the room."""
+    c, s = np.cos(heading), np.sin(heading)
+    px, py = local[..., 0], local[..., 1]
+    return np.stack([x + c * px - s * py, y + s * px + c * py, heading + local[..., 2]], axis=-1)
+
+
+def body_in_room(body: NDArray[np.float32] | Array, pose: Array) -> Array:
+    """Place centre lines (..., points, 2) of the robot's frame at poses (..., 3)."""
+    c, s = np.cos(pose[..., 2])[..., None], np.sin(pose[..., 2])[..., None]
+    bx, by = body[..., 0], body[..., 1]
+    out = np.empty(bx.shape + (2,))
+    np.subtract(c * bx, s * by, out=out[..., 0])
+    np.add(s * bx, c * by, out=out[..., 1])
+    out[..., 0] += pose[..., 0, None]
+    out[..., 1] += pose[..., 1, None]
+    return out

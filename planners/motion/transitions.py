@@ -1,0 +1,145 @@
+"""Simulate every change of gait on the dynamic model: one cycle of each gait after each other.
+
+After a cycle the actuators have forgotten all but the gait they played (exp(-period/tau), 0.2 % at 2 Hz);
+what is left is the forward speed. The speed levels of a gait are the states in which one cycle of it ends
+when begun at different speeds; from each of them every gait is simulated for a cycle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planners.motion.table import SAMPLES, MotionTable
+from srs_opt.gait_opt.table import GaitTable, TableGait
+from srs_opt.model.outline import centre_line_function
+from srs_opt.orbit.solve import periodic_actuators
+from srs_opt.orbit.steady import integrator
+from srs_opt.robot import Robot
+from srs_opt.simulate.integrate import Integrator
+from srs_opt.simulate.mesh import Mesh
+from srs_opt.simulate.rosenbrock import BODY_STATES, VELOCITY
+
+LEVELS = 8  # forward speeds per gait before
+STEP_S = 0.003  # 1e-4 of the distance travelled in a cycle
+SPEED_MARGIN = 1.1  # the levels reach beyond the fastest gait by this factor
+
+Progress = Callable[[Iterable[int]], Iterator[int]]
+
+
+class Transitions(NamedTuple):
+    """What is simulated; arrays as in :class:`MotionTable`, and the curvatures that give the bodies.
+
+    Attributes
+    ----------
+    speed_m_s, speed_after_m_s, pose : arrays
+    kappa : array (n + 1, n, SAMPLES + 1, N-1)
+    """
+
+    speed_m_s: NDArray[np.float64]
+    speed_after_m_s: NDArray[np.float32]
+    pose: NDArray[np.float32]
+    kappa: NDArray[np.float32]
+
+
+class _Cycle:
+    """One gait, ready to be simulated for a cycle from any state."""
+
+    def __init__(self, run: Integrator, entry: TableGait) -> None:
+        gait = entry.gait
+        durations, self.valve = gait.phases()
+        self.mesh = Mesh.uniform(durations, STEP_S)
+        self.p = run.pack(gait.pressure_kpa, gait.frequency_hz)
+        self.time = np.concatenate([[0.0], np.cumsum(self.mesh.h_s)])
+        self.at = np.linspace(0.0, self.time[-1], SAMPLES + 1)
+        self.run = run
+
+    def __call__(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the last state, poses (SAMPLES + 1, 3) and curvatures (SAMPLES + 1, N-1)."""
+        x = state.copy()
+        x[:3] = 0.0
+        states, _ = self.run.steps(x, self.mesh, self.valve, self.p)
+        all_states = np.concatenate([x[:, None], states], axis=1)
+        n = self.run.structure.segments
+        wanted = [0, 1, 2, *range(BODY_STATES, BODY_STATES + n)]
+        sampled = np.stack([np.interp(self.at, self.time, all_states[i]) for i in wanted], axis=1)
+        return states[:, -1], sampled[:, :3], sampled[:, 3:]
+
+
+def simulate_transitions(robot: Robot, table: GaitTable, progress: Progress = iter) -> Transitions:
+    """Return what every gait does after every gait.
+
+    Parameters
+    ----------
+    robot : Robot
+    table : GaitTable
+        Its gaits; their order is that of the motion table. The last row of what comes before is rest.
+    progress : callable
+        Wraps the iteration over the gaits that come before.
+    """
+    run = integrator(robot, table.model)
+    cycles = [_Cycle(run, entry) for entry in table.gaits]
+    n = len(cycles)
+    levels = _speed_levels(table)
+    speed = np.empty((n + 1, LEVELS))
+    after = np.empty((n + 1, n, LEVELS))
+    pose = np.empty((n + 1, n, LEVELS, SAMPLES + 1, 3))
+    kappa = np.empty((n + 1, n, SAMPLES + 1, robot.segments))
+    for before in progress(range(n + 1)):
+        ends = (
+            [run.rest()] * LEVELS if before == n else _ends(run, table.gaits[before], cycles[before], levels)
+        )
+        speed[before] = [state[VELOCITY][0] for state in ends]
+        for now, cycle in enumerate(cycles):
+            for level, start in enumerate(ends[:1] if before == n else ends):
+                last, pose[before, now, level], kappa[before, now] = cycle(start)
+                after[before, now, level] = last[VELOCITY][0]
+    # from rest there is one speed only: equal levels, spaced so that they can be looked up
+    speed[n] = np.linspace(-1e-3, 1e-3, LEVELS)
+    after[n], pose[n] = after[n, :, :1], pose[n, :, :1]
+    return Transitions(speed, *(a.astype(np.float32) for a in (after, pose, kappa)))
+
+
+def motion_table(robot: Robot, table: GaitTable, transitions: Transitions) -> MotionTable:
+    """Return the table that planners look up."""
+    return MotionTable(
+        names=tuple(entry.name for entry in table.gaits),
+        period_s=np.array([entry.gait.period_s for entry in table.gaits]),
+        steady=np.array([entry.displacement for entry in table.gaits]),
+        speed_m_s=transitions.speed_m_s,
+        speed_after_m_s=transitions.speed_after_m_s,
+        pose=transitions.pose,
+        body=_bodies(integrator(robot, table.model), table, transitions.kappa),
+        body_width_m=robot.body_width_m,
+    )
+
+
+def _speed_levels(table: GaitTable) -> np.ndarray:
+    speeds = [entry.speed_m_s for entry in table.gaits]
+    return np.linspace(SPEED_MARGIN * min(0.0, *speeds), SPEED_MARGIN * max(0.0, *speeds), LEVELS)
+
+
+def _ends(run: Integrator, entry: TableGait, cycle: _Cycle, speeds: np.ndarray) -> list[np.ndarray]:
+    """Return the states in which one cycle of a gait ends when begun at different forward speeds."""
+    start = run.rest()
+    start[BODY_STATES:] = periodic_actuators(run, entry.gait, cycle.p)
+    ends = []
+    for speed in speeds:
+        start[VELOCITY] = speed, 0.0, 0.0
+        ends.append(cycle(start)[0])
+    return sorted(ends, key=lambda state: float(state[VELOCITY][0]))
+
+
+def _bodies(run: Integrator, table: GaitTable, kappa: np.ndarray) -> np.ndarray:
+    """Return centre lines (before, now, SAMPLES + 1, points, 2) in the robot's frame."""
+    n = len(table.gaits)
+    rows = []
+    for now, entry in enumerate(table.gaits):
+        p = run.pack(entry.gait.pressure_kpa, entry.gait.frequency_hz)
+        flat = kappa[:, now].reshape(-1, kappa.shape[-1]).T
+        x, y = (np.asarray(v) for v in centre_line_function(run.structure, flat.shape[1])(flat, p))
+        rows.append(np.stack([x, y], axis=-1).reshape(-1, n + 1, SAMPLES + 1, 2).transpose(1, 2, 0, 3))
+    return np.stack(rows, axis=1).astype(np.float32)

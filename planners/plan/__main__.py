@@ -1,0 +1,176 @@
+"""``plan MAZE``: a certified way through a maze for the whole undulating robot, driven if asked."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from srs_opt.command import Answer, Parser, finite_float, make_parser, positive_float, run_command, say
+
+if TYPE_CHECKING:
+    from planners.drive.execute import Execution
+    from planners.plan.answer import PlanResult
+    from planners.search.problem import Problem
+    from srs_opt.robot import Robot
+
+PLANNERS = (
+    *("auto", "lattice", "rrt", "est", "kpiece"),
+    *("dubins-bitstar", "dubins-rrtconnect", "rs-bitstar", "rs-rrtconnect"),
+)
+MARGIN_M = 0.005
+
+
+def build_parser() -> Parser:
+    """Return the command's parser."""
+    from planners.plan.options import goal_option, pose_option
+
+    parser = make_parser(
+        "plan",
+        "Find a way through a maze for the whole body of the robot, choosing a gait for every cycle.\n"
+        "Every plan is certified: played afresh on the dynamic model, body against exact walls.\n"
+        "Lengths in m, angles in rad, times in s. Exit status 1: no way (and why).",
+        "plan mazes/first.yaml --execute --animate out/first.gif",
+    )
+    parser.add_argument(
+        "maze", metavar="MAZE", help="our YAML, ROS map YAML, MovingAI, micromouse .txt, BARN .world"
+    )
+    parser.add_argument(
+        "--gaits", type=Path, metavar="FILE", help="gait table (default: the one built for this robot)"
+    )
+    parser.add_argument("--planner", choices=PLANNERS, default="auto", help="default auto: a portfolio")
+    parser.add_argument("--start", type=pose_option, metavar="X,Y,HEADING", help="in place of the maze's")
+    parser.add_argument("--goal", type=goal_option, metavar="X,Y[,RADIUS]", help="in place of the maze's")
+    parser.add_argument(
+        "--cell", type=positive_float, metavar="M", help="cell size of formats that have none, m"
+    )
+    parser.add_argument(
+        "--scale", type=positive_float, default=1.0, metavar="S", help="factor on the maze's lengths"
+    )
+    parser.add_argument(
+        "--margin",
+        type=finite_float,
+        default=MARGIN_M,
+        metavar="M",
+        help="clearance that the body keeps from walls, m (default %(default)g)",
+    )
+    parser.add_argument(
+        "--drive",
+        type=Path,
+        metavar="FILE",
+        help="drive.json of a drive calibrated by measurements: its uncertainty widens the margin",
+    )
+    parser.add_argument(
+        "--best", action="store_true", help="go on looking for faster plans until the time limit"
+    )
+    parser.add_argument(
+        "--time-limit", type=positive_float, default=60.0, metavar="S", help="guard, s (default %(default)g)"
+    )
+    parser.add_argument(
+        "--execute", action="store_true", help="drive the plan closed-loop on the dynamic model"
+    )
+    parser.add_argument(
+        "--true-robot", type=Path, metavar="FILE", help="drive this robot instead (implies --execute)"
+    )
+    parser.add_argument("--animate", type=Path, metavar="FILE", help="animation, .gif or (with ffmpeg) .mp4")
+    return parser
+
+
+def run(options: argparse.Namespace) -> Answer:
+    """Plan, certify, explain, drive, draw."""
+    from planners.plan.inputs import problem_from
+    from planners.plan.portfolio import Wish, solve
+    from planners.view.animation_path import check_animation_path
+    from srs_opt.files import write_json
+    from srs_opt.robot import load_robot
+
+    if options.animate:
+        check_animation_path(options.animate)  # before any work
+    true_robot = load_robot(options.true_robot) if options.true_robot else None
+    problem = problem_from(options)
+    wish = Wish(options.planner, options.seed, options.time_limit, options.best)
+    result = solve(problem, wish, lambda message: say(options, message))
+    record = result.to_record(problem)
+    files: list[Path] = []
+    execution = None
+    if result.plan is None:
+        files += _explain(options, problem, result, record)
+    else:
+        execution = _drive(options, problem, result, record, true_robot)
+        files += _pictures(options, problem, result, execution)
+    files.append(write_json(options.out / "plan.json", record))
+    good = result.plan is not None and (execution is None or execution.reached)
+    return Answer(record, _summary(record), good, tuple(files))
+
+
+def _explain(
+    options: argparse.Namespace, problem: Problem, result: PlanResult, record: dict[str, Any]
+) -> list[Path]:
+    """Say why there is no way, in the record and as a picture."""
+    from planners.plan.explain import explain
+    from planners.view.obstruction import save_obstruction_picture
+
+    explanation = explain(problem)
+    record["reason"] = explanation.in_words(result.reason)
+    record["tightest"] = explanation.to_record()
+    return [save_obstruction_picture(options.out / "why_not.png", problem, explanation)]
+
+
+def _drive(
+    options: argparse.Namespace,
+    problem: Problem,
+    result: PlanResult,
+    record: dict[str, Any],
+    true_robot: Robot | None,
+) -> Execution | None:
+    """Drive the plan if asked to, and record how it went."""
+    from planners.drive.execute import execute
+
+    if not (options.execute or true_robot) or result.plan is None:
+        return None
+    execution = execute(problem, result.plan, true_robot, lambda message: say(options, message))
+    record["execution"] = execution.to_record()
+    return execution
+
+
+def _pictures(
+    options: argparse.Namespace, problem: Problem, result: PlanResult, execution: Execution | None
+) -> list[Path]:
+    from planners.view.animate import save_animation
+    from planners.view.picture import save_plan_picture
+    from planners.view.record import save_motion
+
+    assert result.plan is not None  # the caller has looked
+    driven = None if execution is None else execution.pose[:, :2]
+    files = [save_plan_picture(options.out / "plan.png", problem, result.plan, driven)]
+    files.append(save_motion(options.out / "motion.json", problem, result.plan, execution))
+    if options.animate:
+        files.append(save_animation(options.animate, problem, result.plan, execution))
+    return files
+
+
+def _summary(record: dict[str, Any]) -> str:
+    """Return the answer in words."""
+    if record["status"] != "solved":
+        return f"{record['status']}: {record['reason']} ({record['planning_s']:.2f} s)"
+    lines = [
+        f"solved by {record['planner']} in {record['planning_s']:.2f} s: {record['length_m']:.2f} m, "
+        f"{record['duration_s']:.1f} s, {sum(s['cycles'] for s in record['steps'])} cycles, clearance "
+        f"{1e3 * record['clearance_m']:.1f} mm, certified"
+    ]
+    if execution := record.get("execution"):
+        lines.append(
+            f"driven: {execution['reason']}; {execution['duration_s']:.1f} s, "
+            f"smallest clearance {1e3 * execution['smallest_clearance_m']:.1f} mm, "
+            f"{execution['replans']} new plans on the way"
+        )
+    return "\n".join(lines)
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the command."""
+    return run_command(build_parser(), run, argv)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,75 @@
+"""Robot, gaits and maze from the command's options."""
+
+from __future__ import annotations
+
+import argparse
+
+from planners.maze.load import load_maze
+from planners.maze.maze import Maze
+from planners.maze.placement import check_placement
+from planners.maze.places import RobotSize
+from planners.motion.store import load_motion
+from planners.search.problem import Problem
+from srs_opt.command import progress, say
+from srs_opt.drive.calibration import load_calibration
+from srs_opt.errors import InputError
+from srs_opt.gait_opt.table import GaitTable, load_table
+from srs_opt.model.parameters import room_effects
+from srs_opt.robot import Robot, load_robot
+
+
+def problem_from(options: argparse.Namespace) -> Problem:
+    """Return the planning problem; bad input is an InputError.
+
+    The maze is looked at first, so that a bad one is refused before anything slow.
+    """
+    import scipy.ndimage
+    import scipy.sparse.csgraph  # noqa: F401  (imported here so that planning time is planning time)
+
+    robot = load_robot(options.robot)
+    if not 0 <= options.margin < robot.length_m:
+        raise InputError(f"--margin: expected 0 to {robot.length_m:.3g} m, found {options.margin:g}")
+    maze = maze_from(options, robot)
+    gaits = gaits_from(options, robot)
+    motion = load_motion(
+        robot, gaits, lambda rows: progress(rows, options, "changes of gait (once per gait table)")
+    )
+    return Problem(robot, gaits, motion, maze, options.margin + drive_margin_m(options, gaits))
+
+
+def drive_margin_m(options: argparse.Namespace, gaits: GaitTable) -> float:
+    """Return the clearance that a calibrated drive's uncertainty costs, corrected every cycle."""
+    if options.drive is None:
+        return 0.0
+    longest_m = max(abs(entry.speed_m_s) * entry.gait.period_s for entry in gaits.gaits)
+    margin_m = load_calibration(options.drive).margin_m(longest_m)
+    say(options, f"note: the measured drive is uncertain; {1e3 * margin_m:.1f} mm more are kept from walls")
+    return margin_m
+
+
+def maze_from(options: argparse.Namespace, robot: Robot) -> Maze:
+    """Return the maze with start and goal, both possible for the straight robot."""
+    size = RobotSize(robot.length_m, robot.body_width_m / 2, options.margin)
+    maze = load_maze(
+        options.maze,
+        options.cell,
+        options.scale,
+        robot_length_m=size.length_m,
+        body_half_width_m=size.half_width_m,
+        margin_m=size.margin_m,
+        start=options.start,
+        goal=options.goal,
+    )
+    check_placement(maze, size)
+    return maze
+
+
+def gaits_from(options: argparse.Namespace, robot: Robot) -> GaitTable:
+    """Return the gait table: that of --gaits, else the one built for this robot (built now if need be)."""
+    if options.gaits:
+        return load_table(options.gaits, robot)
+    from srs_opt.gait_opt.catalogue import default_table
+
+    if unsteady := room_effects(robot):
+        say(options, f"note: planned without {', '.join(unsteady)}: what depends on the room has no gait")
+    return default_table(robot, options.model, say=lambda text: say(options, text))

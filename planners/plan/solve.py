@@ -1,0 +1,150 @@
+"""From a problem to a certified plan with the lattice search, mended where the certificate refuses."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+from planners.plan.answer import Plan, PlanResult, Status
+from planners.plan.certify import Certificate, certify
+from planners.plan.explain import narrower_than_any_gait
+from planners.search.lattice import LatticeSearch, LatticeSettings, Root, at_rest
+from planners.search.problem import ROUNDING_M, Problem
+
+CHUNK = 100  # nodes between looks at the clock
+LOOK_FIRST = 300  # nodes before the widths are looked at: most mazes are solved by then
+BACK = 3  # cycles before a failure from where the way is searched again, more at every attempt
+ATTEMPTS = 12
+MORE_SLACK_M = 0.0005
+
+
+class LatticeSolver:
+    """Lattice search and certificate, together; can be asked to go on.
+
+    Where the finer simulation of the certificate leads too near to a wall (the search integrates more
+    coarsely), the search begins again a few cycles before, from the finer simulation's state. When nothing
+    is left to look at, the cells are halved once before the maze is said to have no way.
+
+    Parameters
+    ----------
+    problem : Problem
+    settings : LatticeSettings, optional
+    root : Root, optional
+        Where to begin; at rest at the start without it.
+    time_limit_s : float
+        A guard only: what is found does not depend on it.
+    tell : callable
+        Gets messages about the progress.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        settings: LatticeSettings | None = None,
+        root: Root | None = None,
+        *,
+        time_limit_s: float = 30.0,
+        tell: Callable[[str], None] = lambda message: None,
+    ) -> None:
+        self.problem, self.tell = problem, tell
+        self.settings = settings or LatticeSettings()
+        self.began, self.time_limit_s = time.perf_counter(), time_limit_s
+        self.judged = root is not None  # widths are judged on the whole way only
+        self.begin = root or at_rest(problem)
+        self.counts = {"expanded": 0, "simulated": 0, "certificates": 0}
+        self.kept: tuple[int, ...] = ()
+        self.attempts, self.refined = 0, False
+        self.search = LatticeSearch(problem, self.settings, self.begin)
+
+    @property
+    def looked_at(self) -> int:
+        """Cycles simulated so far, by all searches."""
+        return self.counts["simulated"] + self.search.simulated
+
+    def run(self, max_nodes: int = 400_000) -> PlanResult:
+        """Return the first certified plan among `max_nodes` more cycles, or why there is none."""
+        last = self.looked_at + max_nodes
+        while self.attempts < ATTEMPTS:
+            outcome = self._look(last)
+            if isinstance(outcome, PlanResult):
+                return outcome
+            if outcome is None:
+                if not self._retreat():
+                    reason = "no way at this resolution: everything reachable was looked at"
+                    return self._answer("infeasible", reason)
+                continue
+            gaits = self.kept + outcome
+            certificate = certify(self.problem, gaits, self.begin)
+            self.counts["certificates"] += 1
+            if certificate.passed:
+                return self._answer("solved", None, Plan("lattice", gaits, certificate))
+            self._mend(gaits, certificate)
+        return self._answer("timeout", "plans were found but none passed the certificate")
+
+    def _look(self, last: int) -> tuple[int, ...] | PlanResult | None:
+        """Return the gaits of a way, None when nothing is left to look at, or the answer when to stop."""
+        while not self.search.exhausted:
+            way = self.search.advance(CHUNK)
+            if way is not None:
+                return tuple(step.gait for step in way)
+            if not self.judged and self.looked_at >= LOOK_FIRST:
+                self.judged = True
+                if narrower_than_any_gait(self.problem):
+                    return self._answer("infeasible", "no way: the widest route is too narrow for every gait")
+            if time.perf_counter() - self.began > self.time_limit_s:
+                return self._answer("timeout", f"no plan within the time limit of {self.time_limit_s:g} s")
+            if self.looked_at > last:
+                return self._answer("timeout", f"no plan among the first {self.looked_at} cycles looked at")
+        return None
+
+    def _retreat(self) -> bool:
+        """Begin again from the start, or more finely; return whether there is anything left to try."""
+        if not self.kept:
+            if self.refined:
+                return False
+            self.refined = True
+            s = self.settings
+            self.settings = replace(
+                s, cell_m=s.cell_m / 2, course_rad=s.course_rad / 2, speed_m_s=s.speed_m_s / 2
+            )
+            self.tell("nothing left at this resolution; looking again at half of it")
+        self._begin_again((), self.begin)
+        return True
+
+    def _mend(self, gaits: tuple[int, ...], certificate: Certificate) -> None:
+        """Begin again some cycles before the failure, with a little more clearance."""
+        self.tell(f"certificate refused: {certificate.reason}; mending the plan from there")
+        assert certificate.failed_cycle is not None  # it has failed
+        keep = max(0, certificate.failed_cycle - BACK * self.counts["certificates"])
+        here = self.begin
+        if keep:
+            here = Root(certificate.states[keep - 1], gaits[keep - 1], -ROUNDING_M)
+        self.settings = replace(self.settings, slack_m=self.settings.slack_m + MORE_SLACK_M)
+        self._begin_again(gaits[:keep], here)
+
+    def _begin_again(self, kept: tuple[int, ...], here: Root) -> None:
+        self.attempts += 1
+        self.counts["expanded"] += self.search.expanded
+        self.counts["simulated"] += self.search.simulated
+        self.kept = kept
+        self.search = LatticeSearch(self.problem, self.settings, here)
+
+    def _answer(self, status: Status, reason: str | None, plan: Plan | None = None) -> PlanResult:
+        effort = dict(self.counts)
+        effort["expanded"] += self.search.expanded
+        effort["simulated"] += self.search.simulated
+        return PlanResult(status, plan, reason, time.perf_counter() - self.began, effort)
+
+
+def solve_with_lattice(
+    problem: Problem,
+    settings: LatticeSettings | None = None,
+    root: Root | None = None,
+    *,
+    time_limit_s: float = 30.0,
+    max_nodes: int = 400_000,
+    tell: Callable[[str], None] = lambda message: None,
+) -> PlanResult:
+    """Return the first certified plan of the lattice search; see :class:`LatticeSolver`."""
+    return LatticeSolver(problem, settings, root, time_limit_s=time_limit_s, tell=tell).run(max_nodes)

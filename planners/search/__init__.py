@@ -1,0 +1,1 @@
+"""Searches for a sequence of gaits: a deterministic lattice search and OMPL's planners."""

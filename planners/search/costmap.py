@@ -1,0 +1,121 @@
+"""How long from here to the goal: Dijkstra over a grid, slower where only slim gaits fit."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planners.maze.field import DistanceField
+from planners.maze.places import Goal
+from srs_opt.gait_opt.table import GaitTable
+
+Array = NDArray[np.float64]
+NODES, MOST_NODES = 40_000, 1_500_000
+FINEST_M = 0.006
+BLOCKED_S = 1e6
+# neighbours up to a knight's move: paths at most 2.7 % too long
+_STEPS = [(0, 1), (1, 0), (1, 1), (1, -1), (1, 2), (2, 1), (1, -2), (2, -1)]
+
+
+@dataclass(frozen=True, eq=False)
+class CostMap:
+    """Time to the goal on a grid of nodes, in seconds; BLOCKED_S where there is no way.
+
+    Attributes
+    ----------
+    seconds : array (rows, columns)
+    origin : (float, float)
+        Position of node (0, 0), m.
+    spacing_m : float
+    """
+
+    seconds: Array
+    origin: tuple[float, float]
+    spacing_m: float
+
+    def at(self, points: Array) -> Array:
+        """Return the time (s) from `points`, shape (..., 2), by bilinear interpolation; free nodes lead."""
+        rows, columns = self.seconds.shape
+        u = np.clip((points[..., 0] - self.origin[0]) / self.spacing_m, 0, columns - 1.001)
+        v = np.clip((points[..., 1] - self.origin[1]) / self.spacing_m, 0, rows - 1.001)
+        i, j = v.astype(np.int64), u.astype(np.int64)
+        dv, du = v - i, u - j
+        total, weight = np.zeros(i.shape), np.full(i.shape, 1e-9)
+        for a, b, w in (
+            (0, 0, (1 - dv) * (1 - du)),
+            (0, 1, (1 - dv) * du),
+            (1, 0, dv * (1 - du)),
+            (1, 1, dv * du),
+        ):
+            value = self.seconds[i + a, j + b]
+            w = np.where(value < BLOCKED_S, w + 1e-6, 0.0)
+            total += w * np.minimum(value, BLOCKED_S)
+            weight += w
+        return np.where(weight > 1e-7, total / weight, BLOCKED_S)
+
+
+def speed_by_room(table: GaitTable) -> tuple[Array, Array]:
+    """Return half-widths (m, ascending) and the best speed (m/s) of a gait that fits into each."""
+    reach = np.array([max(entry.envelope_m) for entry in table.gaits])
+    speed = np.array([abs(entry.speed_m_s) for entry in table.gaits])
+    order = np.argsort(reach)
+    return reach[order], np.maximum.accumulate(speed[order])
+
+
+def cost_map(field: DistanceField, goal: Goal, table: GaitTable, half_width_m: float) -> CostMap:
+    """Return the time to `goal` for the centre of mass.
+
+    Nodes nearer to a wall than half the body's width less the little by which the centre of mass of a bent
+    body leaves its centre line are blocked.
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import dijkstra
+
+    xmin, ymin, xmax, ymax = field.bounds
+    area = (xmax - xmin) * (ymax - ymin)
+    blocked = 0.6 * half_width_m
+    # finer than the blocked strip about the thinnest wall, so that no cell has nodes on both sides of it
+    spacing = min(max(math.sqrt(area / NODES), FINEST_M), 2 * blocked)
+    spacing = max(spacing, math.sqrt(area / MOST_NODES))
+    columns, rows = (max(2, math.ceil(side / spacing)) for side in (xmax - xmin, ymax - ymin))
+    x, y = xmin + spacing * (np.arange(columns) + 0.5), ymin + spacing * (np.arange(rows) + 0.5)
+    nodes = np.stack(np.meshgrid(x, y), axis=-1)
+    room = field.clearance(nodes)
+    reach, speed = speed_by_room(table)
+    slowness = _slowness(room, reach, speed)
+    free = room > blocked
+    index = np.arange(rows * columns).reshape(rows, columns)
+    starts, ends, costs = [], [], []
+    for di, dj in _STEPS:
+        a = (slice(max(0, -di), rows - max(0, di)), slice(max(0, -dj), columns - max(0, dj)))
+        b = (slice(max(0, di), rows + min(0, di)), slice(max(0, dj), columns + min(0, dj)))
+        ok = free[a] & free[b]
+        for part in (1 / 3, 2 / 3) if abs(di) + abs(dj) > 2 else (1 / 2,):
+            between = (1 - part) * nodes[a][ok] + part * nodes[b][ok]
+            ok[ok] = field.clearance(between) > blocked
+        starts.append(index[a][ok])
+        ends.append(index[b][ok])
+        costs.append(math.hypot(di, dj) * spacing * (slowness[a][ok] + slowness[b][ok]) / 2)
+    away = goal.distance(nodes).ravel()
+    sources = np.flatnonzero((away <= 0) & free.ravel())
+    if not sources.size:  # a goal smaller than the grid
+        sources = np.array([np.where(free.ravel(), away, np.inf).argmin()])
+    count = rows * columns
+    graph = coo_matrix(
+        (np.concatenate(costs), (np.concatenate(starts), np.concatenate(ends))), shape=(count, count)
+    )
+    seconds = dijkstra(graph.tocsr(), directed=False, indices=sources, min_only=True)
+    seconds = np.where(np.isfinite(seconds), seconds, BLOCKED_S).reshape(rows, columns)
+    return CostMap(seconds, (float(x[0]), float(y[0])), spacing)
+
+
+def _slowness(room: Array, reach: Array, speed: Array) -> Array:
+    """Return seconds per metre: the fastest gait that fits, and a little less near walls."""
+    fitting = np.searchsorted(reach, room, side="right") - 1
+    best = np.where(fitting >= 0, speed[np.maximum(fitting, 0)], 0.25 * speed[0])
+    best = np.maximum(best, 0.1 * speed[-1])
+    comfortable = np.clip(room / (1.5 * reach.max()), 0.3, 1.0)
+    return 1 / (best * comfortable)

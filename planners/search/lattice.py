@@ -1,0 +1,220 @@
+"""Best-first search over cycles of gaits (Hybrid A* with the dynamic model inside).
+
+A node is the state of the dynamic model at the end of a cycle. The motion table proposes where every gait
+would lead and sorts out what cannot be; only the node that the search goes on from is simulated, so the
+tree consists of true motions, transients included. Nodes are told apart by cells of place, course and
+speed: what is left when none remains is a proof at that resolution.
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planners.maze.places import Goal
+from planners.motion.table import body_in_room
+from planners.search.costmap import BLOCKED_S
+from planners.search.problem import Cycle, Problem
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LatticeSettings:
+    """Resolution and greed.
+
+    Attributes
+    ----------
+    cell_m, course_rad, speed_m_s : float
+        Cells by which nodes are told apart.
+    close_m, most_halvings : float, int
+        A body nearer to a wall than this is told apart more finely: half the cell for every halving of its
+        clearance, so many times at most.
+    greed : float
+        Weight of the remaining time against the time spent: 1 looks for fast plans, more finds one sooner.
+    change_s : float
+        Price of changing gait.
+    air_s : float
+        Price of a cycle that just keeps the margin (none where a body width of air is left).
+    slack_m : float
+        Beyond the margin, for what happens between the samples of a cycle.
+    """
+
+    cell_m: float = 0.02
+    course_rad: float = math.radians(12)
+    speed_m_s: float = 0.12
+    close_m: float = 0.02
+    most_halvings: int = 0
+    greed: float = 3.0
+    change_s: float = 0.05
+    air_s: float = 0.3
+    slack_m: float = 0.0005
+
+
+class Root(NamedTuple):
+    """Where a search begins: state of the dynamic model, gait before (or rest), slack of the first cycle."""
+
+    state: Array
+    gait: int
+    slack_m: float
+
+
+def at_rest(problem: Problem) -> Root:
+    """Return the straight robot at rest at the start."""
+    start = problem.start
+    state = problem.run.rest(start.x, start.y, start.heading)
+    return Root(state, problem.motion.rest, problem.start_slack_m)
+
+
+class Step(NamedTuple):
+    """A node on the way: the gait that led here and what happened in its cycle."""
+
+    gait: int
+    cycle: Cycle
+
+
+@dataclass
+class _Tree:
+    parent: list[int] = field(default_factory=list)
+    gait: list[int] = field(default_factory=list)
+    spent: list[float] = field(default_factory=list)
+    cycle: list[Cycle] = field(default_factory=list)
+
+    def add(self, parent: int, gait: int, spent: float, cycle: Cycle) -> int:
+        self.parent.append(parent)
+        self.gait.append(gait)
+        self.spent.append(spent)
+        self.cycle.append(cycle)
+        return len(self.parent) - 1
+
+    def way_to(self, node: int) -> list[Step]:
+        steps = []
+        while self.parent[node] >= 0:
+            steps.append(Step(self.gait[node], self.cycle[node]))
+            node = self.parent[node]
+        return steps[::-1]
+
+
+class LatticeSearch:
+    """A search that can be asked for the next plan until nothing is left."""
+
+    def __init__(
+        self, problem: Problem, settings: LatticeSettings | None = None, root: Root | None = None
+    ) -> None:
+        root = root or at_rest(problem)
+        self.problem = problem
+        self.root_slack_m = root.slack_m
+        self.settings = settings or LatticeSettings()
+        self.expanded = 0
+        self.simulated = 0
+        self._tree = _Tree()
+        self._closed: set[tuple[int, ...]] = set()
+        self._open: list[tuple[float, int, int, int, float]] = []
+        self._count = 0
+        motion = problem.motion
+        first = Cycle(root.state, root.state[None, :3], np.zeros((0, 1, 2)))
+        self._lever = problem.robot.length_m / 2
+        self._gaits = np.arange(motion.size)
+        self._propose(self._tree.add(-1, root.gait, 0.0, first))
+
+    def advance(self, expansions: int) -> list[Step] | None:
+        """Look at up to `expansions` more nodes; return the way to the goal when one is found."""
+        for _ in range(expansions):
+            if not self._open:
+                return None
+            node = self._take()
+            if node is None:
+                continue
+            cycle = self._tree.cycle[node]
+            if arrival_index(self.problem.goal, cycle.pose) is not None:
+                return self._tree.way_to(node)
+            self._propose(node)
+        return None
+
+    @property
+    def exhausted(self) -> bool:
+        """Whether nothing is left to look at: no way at this resolution."""
+        return not self._open
+
+    def _take(self) -> int | None:
+        """Simulate the most promising proposal; return its node if it is new and clear."""
+        _, _, parent, gait, spent = heapq.heappop(self._open)
+        self.simulated += 1
+        cycle = self.problem.simulate(self._tree.cycle[parent].state, gait)
+        key = self._key(cycle, gait)
+        if key in self._closed:
+            return None
+        # the start may be as near to a wall as it likes; no cycle may bring the body nearer than that
+        slack = self.root_slack_m if parent == 0 else self.settings.slack_m
+        if not self.problem.body.keeps_margin(cycle.lines, slack):
+            return None
+        self._closed.add(key)
+        return self._tree.add(parent, gait, spent, cycle)
+
+    def _key(self, cycle: Cycle, gait: int) -> tuple[int, ...]:
+        """Return the cell of a state; with halvings, cells are smaller near walls: a millimetre decides."""
+        s, state = self.settings, cycle.state
+        finer = 0
+        if s.most_halvings:
+            room = max(float(self.problem.body.estimate(cycle.lines[::2]).min()), 1e-3)
+            finer = min(max(math.ceil(math.log2(s.close_m / room)), 0), s.most_halvings)
+        course = (state[2] + self.problem.motion.course[gait]) % (2 * math.pi)
+        cell, angle = s.cell_m / 2**finer, s.course_rad / 2**finer
+        return (
+            finer,
+            math.floor(state[0] / cell),
+            math.floor(state[1] / cell),
+            math.floor(course / angle),
+            math.floor(state[3] / s.speed_m_s + 0.5),
+        )
+
+    def _propose(self, node: int) -> None:
+        """Put the cycles that can follow a node on the list."""
+        self.expanded += 1
+        problem, s, motion = self.problem, self.settings, self.problem.motion
+        state, before = self._tree.cycle[node].state, self._tree.gait[node]
+        move = motion.move(state[0], state[1], state[2], before, state[3])
+        # every other point and sample decides what is out of the question; the simulation decides the rest
+        lines = motion_lines(problem, before, move.pose)
+        room = problem.body.estimate(lines).min(axis=1)
+        end = move.pose[:, -1]
+        left = self._remaining(end)
+        possible = (room > problem.margin_m - problem.field.error_m) & (left < BLOCKED_S / 2)
+        air = np.clip(1 - (room - problem.margin_m) / problem.motion.body_width_m, 0.0, 1.0)
+        spent = self._tree.spent[node] + motion.period_s
+        spent = spent + s.change_s * (self._gaits != before) + s.air_s * air
+        rank = spent + s.greed * left
+        for gait in np.flatnonzero(possible):
+            self._count += 1
+            heapq.heappush(self._open, (float(rank[gait]), self._count, node, int(gait), float(spent[gait])))
+
+    def _remaining(self, end: Array) -> Array:
+        """Return the estimated time to the goal (s) from poses (gaits, 3): head, middle and tail."""
+        course = end[:, 2] + self.problem.motion.course[:-1]
+        along = self._lever * np.stack([np.cos(course), np.sin(course)], axis=1)
+        where = end[:, :2]
+        points = np.stack([where, where + along, where + 0.5 * along])
+        middle, head, front = self.problem.to_goal.at(points)
+        head = np.where(head < BLOCKED_S, head, middle + 1.0)
+        front = np.where(front < BLOCKED_S, front, middle + 0.5)
+        return np.where(middle < BLOCKED_S, (middle + head + front) / 3, BLOCKED_S)
+
+
+def arrival_index(goal: Goal, pose: Array) -> int | None:
+    """Return the first of the poses (n, 3) that is in the goal, heading included; None if none is."""
+    inside = np.flatnonzero(goal.distance(pose[:, :2]) <= 0)
+    for index in inside:
+        if goal.heading_error(float(pose[index, 2])) <= 0:
+            return int(index)
+    return None
+
+
+def motion_lines(problem: Problem, before: int, pose: Array) -> Array:
+    """Return thinned centre lines (gaits, samples, points, 2) of a cycle of every gait."""
+    body = problem.motion.body[before, :, 2::2, ::4]
+    return body_in_room(body, pose[:, 2::2])

@@ -1,0 +1,154 @@
+"""OMPL's geometric planners on curves of bounded radius (Dubins, Reeds-Shepp), smoothed, then driven.
+
+The body stands in for itself by a straight strip as long as the robot and as wide as a gait sweeps; what
+the path is worth is seen when the dynamic model follows it, and in the certificate.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planners.search.follow import follow, reference_along
+from planners.search.lattice import Step
+from planners.search.ompl_setup import counted, seeded
+from planners.search.problem import Problem
+
+Array = NDArray[np.float64]
+NAMES = ("dubins-bitstar", "dubins-rrtconnect", "rs-bitstar", "rs-rrtconnect")
+STEP_M = 0.02  # between the poses at which a path is checked and given back
+STRIP_POINTS = 7
+
+
+@dataclass(frozen=True)
+class Curves:
+    """What the geometric planners assume of the robot: turning radius and the strip it sweeps.
+
+    Attributes
+    ----------
+    radius_m, half_width_m : float
+    """
+
+    radius_m: float
+    half_width_m: float
+
+
+def curves_of(problem: Problem) -> tuple[Curves, Curves]:
+    """Return a comfortable and a tight assumption, from the table's gaits."""
+    turning = [e for e in problem.gaits.gaits if e.radius_m is not None and e.speed_m_s > 0.05]
+    radii = np.array([abs(e.radius_m or 0.0) for e in turning])
+    bands = np.array([sum(e.envelope_m) / 2 for e in turning])
+    if not radii.size:
+        return (Curves(1.0, problem.robot.body_width_m),) * 2
+    slimmest = min(sum(e.envelope_m) / 2 for e in problem.gaits.gaits if abs(e.speed_m_s) > 0.05)
+    easy = Curves(1.3 * float(radii.min()), float(np.median(bands)))
+    return easy, Curves(float(radii.min()), max(slimmest, problem.robot.body_width_m / 2))
+
+
+def search_geometric(problem: Problem, planner: str, iterations: int, seed: int) -> list[Step] | None:
+    """Return a way to the goal, or None.
+
+    Parameters
+    ----------
+    problem : Problem
+    planner : one of NAMES
+    iterations : int
+        After how many the planner gives up.
+    seed : int
+    """
+    for curves in curves_of(problem):
+        path = geometric_path(problem, planner, curves, iterations, seed)
+        if path is not None:
+            way = follow(problem, reference_along(problem, path))
+            if way is not None:
+                return way
+    return None
+
+
+def geometric_path(
+    problem: Problem, planner: str, curves: Curves, iterations: int, seed: int
+) -> Array | None:
+    """Return the poses (n, 3) of a path that the strip can follow, or None."""
+    from ompl import base, geometric
+
+    seeded(seed)
+    kind, method = planner.split("-")
+    space = (base.DubinsStateSpace if kind == "dubins" else base.ReedsSheppStateSpace)(curves.radius_m)
+    xmin, ymin, xmax, ymax = problem.maze.bounds
+    bounds = base.RealVectorBounds(2)
+    for axis, (low, high) in enumerate(((xmin, xmax), (ymin, ymax))):
+        bounds.setLow(axis, low)
+        bounds.setHigh(axis, high)
+    space.setBounds(bounds)
+    setup = geometric.SimpleSetup(space)
+    setup.setStateValidityChecker(_strip_checker(problem, curves))
+    info = setup.getSpaceInformation()
+    info.setStateValidityCheckingResolution(STEP_M / space.getMaximumExtent())
+    start, goal = space.allocState(), space.allocState()
+    _set(start, problem.start.x, problem.start.y, problem.start.heading)
+    _set(goal, *_goal_pose(problem))
+    setup.setStartAndGoalStates(start, goal, 0.01)
+    made = {"bitstar": geometric.BITstar, "rrtconnect": geometric.RRTConnect}[method](info)
+    setup.setPlanner(made)
+    setup.setup()
+    setup.solve(counted(iterations, setup.haveExactSolutionPath))
+    if not setup.haveExactSolutionPath():
+        return None
+    path = setup.getSolutionPath()
+    if method == "rrtconnect":  # BIT* is already short; the simplifier's rounds are counted, not timed
+        simplifier = geometric.PathSimplifier(info)
+        simplifier.reduceVertices(path, 50, 50, 0.5)
+    if not path.check():  # some planners call paths exact that are not
+        return None
+    path.interpolate(max(2, int(path.length() / STEP_M)))
+    return np.array([[s.getX(), s.getY(), s.getYaw()] for s in path.getStates()])
+
+
+def _strip_checker(problem: Problem, curves: Curves) -> Any:
+    """Return the check that a straight strip at a pose keeps off the walls."""
+    half = problem.robot.length_m / 2 - problem.robot.body_width_m / 2
+    offsets = np.linspace(-half, half, STRIP_POINTS)
+    field = problem.field
+    keep = curves.half_width_m + problem.margin_m
+    # the start may be nearer to a wall than a gait sweeps
+    sx, sy = problem.start.x, problem.start.y
+
+    def valid(state: Any) -> bool:
+        x, y, yaw = state.getX(), state.getY(), state.getYaw()
+        wanted = problem.body.half_width_m if math.hypot(x - sx, y - sy) < half else keep
+        points = np.stack([x + offsets * math.cos(yaw), y + offsets * math.sin(yaw)], axis=1)
+        return bool(field.clearance(points).min() >= wanted)
+
+    return valid
+
+
+def _goal_pose(problem: Problem) -> tuple[float, float, float]:
+    """Return a pose in the goal: where the quickest way for a point arrives, and its heading there."""
+    trail = [np.array([problem.start.x, problem.start.y])]
+    turns = np.arange(0.0, 2 * math.pi, math.pi / 8)
+    circle = STEP_M * np.stack([np.cos(turns), np.sin(turns)], axis=1)
+    # downhill on the time to go; it falls by a step's worth at least, so this ends
+    for _ in range(int(1e5)):
+        around = trail[-1] + circle
+        following = around[int(problem.to_goal.at(around).argmin())]
+        if problem.to_goal.at(following) >= problem.to_goal.at(trail[-1]):
+            break
+        trail.append(following)
+    last = trail[-1]
+    before = trail[max(0, len(trail) - 1 - round(0.15 / STEP_M))]
+    heading = problem.goal.heading
+    if heading is None:
+        heading = math.atan2(last[1] - before[1], last[0] - before[0])
+    if problem.goal.boxes or problem.goal.distance(last) <= 0:
+        return float(last[0]), float(last[1]), heading
+    return problem.goal.x, problem.goal.y, heading
+
+
+def _set(state: Any, x: float, y: float, heading: float) -> None:
+    state.setX(float(x))
+    state.setY(float(y))
+    state.setYaw(math.remainder(heading, 2 * math.pi))

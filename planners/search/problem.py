@@ -1,0 +1,133 @@
+"""One planning problem: robot, gaits, maze, and everything that is worked out once for them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planners.maze.field import DistanceField
+from planners.maze.maze import Maze
+from planners.maze.places import Goal, Pose, RobotSize
+from planners.motion.robots import undelayed
+from planners.motion.table import SAMPLES, MotionTable, body_in_room
+from planners.search.clearance import BodyClearance
+from planners.search.costmap import CostMap, cost_map
+from srs_opt.gait_opt.table import GaitTable
+from srs_opt.model.outline import centre_line_function
+from srs_opt.orbit.steady import integrator
+from srs_opt.robot import Robot
+from srs_opt.simulate.integrate import Integrator
+from srs_opt.simulate.mesh import Mesh
+from srs_opt.simulate.rosenbrock import BODY_STATES
+
+Array = NDArray[np.float64]
+ROUNDING_M = 1e-6
+STEP_S = 0.002  # errs by about 0.04 mrad per cycle
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """One simulated cycle.
+
+    Attributes
+    ----------
+    state : array
+        State at its end.
+    pose : array (SAMPLES + 1, 3)
+    lines : array (SAMPLES + 1, points, 2)
+        Centre line of the body in the room.
+    """
+
+    state: Array
+    pose: Array
+    lines: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """What a planner is given.
+
+    Attributes
+    ----------
+    robot : Robot
+    gaits : GaitTable
+    motion : MotionTable
+    maze : Maze
+        With start and goal.
+    margin_m : float
+    """
+
+    robot: Robot
+    gaits: GaitTable
+    motion: MotionTable
+    maze: Maze
+    margin_m: float
+
+    def __getstate__(self) -> dict[str, object]:
+        """Only what was given goes to other processes: what was worked out may hold compiled code."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}
+
+    @property
+    def start(self) -> Pose:
+        """Where the robot starts, straight and at rest."""
+        assert self.maze.start is not None
+        return self.maze.start
+
+    @property
+    def goal(self) -> Goal:
+        """Where it shall arrive."""
+        assert self.maze.goal is not None
+        return self.maze.goal
+
+    @cached_property
+    def field(self) -> DistanceField:
+        """Distances to walls."""
+        return DistanceField.of(self.maze)
+
+    @cached_property
+    def body(self) -> BodyClearance:
+        """Clearance of bodies."""
+        return BodyClearance(self.maze, self.field, self.robot.body_width_m / 2, self.margin_m)
+
+    @cached_property
+    def to_goal(self) -> CostMap:
+        """Time to the goal."""
+        return cost_map(self.field, self.goal, self.gaits, self.robot.body_width_m / 2)
+
+    @cached_property
+    def start_slack_m(self) -> float:
+        """By how much the straight body at the start clears the margin; not above 0, rounding taken off."""
+        size = RobotSize(self.robot.length_m, self.robot.body_width_m / 2, self.margin_m)
+        clearance = self.maze.clearance(size.straight_body(self.start))
+        return min(clearance - self.margin_m, 0.0) - ROUNDING_M
+
+    @cached_property
+    def run(self) -> Integrator:
+        """The dynamic model, without effects that know the room and without the valves' delay."""
+        return integrator(undelayed(self.robot), self.gaits.model)
+
+    @cached_property
+    def _cycles(self) -> list[tuple[Mesh, Array, Array, Array, Array]]:
+        cycles = []
+        for entry in self.gaits.gaits:
+            durations, valve = entry.gait.phases()
+            mesh = Mesh.uniform(durations, STEP_S)
+            time = np.concatenate([[0.0], np.cumsum(mesh.h_s)])
+            p = self.run.pack(entry.gait.pressure_kpa, entry.gait.frequency_hz)
+            cycles.append((mesh, valve, p, time, np.linspace(0.0, time[-1], SAMPLES + 1)))
+        return cycles
+
+    def simulate(self, state: Array, gait: int) -> Cycle:
+        """Return one cycle of a gait from a state of the dynamic model."""
+        mesh, valve, p, time, at = self._cycles[gait]
+        states, _ = self.run.steps(state, mesh, valve, p)
+        everything = np.concatenate([state[:, None], states], axis=1)
+        n = self.robot.segments
+        wanted = [0, 1, 2, *range(BODY_STATES, BODY_STATES + n)]
+        sampled = np.stack([np.interp(at, time, everything[i]) for i in wanted])
+        pose = sampled[:3].T
+        x, y = (np.asarray(v) for v in centre_line_function(self.run.structure, SAMPLES + 1)(sampled[3:], p))
+        return Cycle(states[:, -1], pose, body_in_room(np.stack([x.T, y.T], axis=-1), pose))

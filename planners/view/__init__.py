@@ -1,0 +1,1 @@
+"""Pictures of plans: maze with swept body, clearance along the way, animations."""

@@ -1,0 +1,79 @@
+"""The robot on its way through the maze, as a GIF or (with ffmpeg) an MP4."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import shapely
+
+from planners.maze.draw import draw_maze
+from planners.plan.answer import Plan
+from planners.search.problem import Problem
+from planners.view.animation_path import check_animation_path
+from planners.view.picture import gait_colors
+from srs_opt.files import atomic_path
+
+if TYPE_CHECKING:
+    from planners.drive.execute import Execution
+
+FRAMES_PER_S = 20
+MAX_FRAMES = 600
+LONG_SIDE_INCHES = 7.0
+
+
+def save_animation(path: Path, problem: Problem, plan: Plan, execution: Execution | None = None) -> Path:
+    """Write the animation of a plan, or of its execution where there is one; real time, thinned when long.
+
+    Raises
+    ------
+    InputError
+        For an unknown ending, or .mp4 without ffmpeg.
+    """
+    from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
+    from matplotlib.figure import Figure
+    from matplotlib.patches import Polygon
+
+    check_animation_path(path)
+    time, pose, lines, gait = _motion(plan, problem, execution)
+    frames = min(MAX_FRAMES, max(2, int(time[-1] * FRAMES_PER_S)))
+    index = np.searchsorted(time, np.linspace(0, time[-1], frames)).clip(0, len(time) - 1)
+    ratio = problem.maze.height_m / problem.maze.width_m
+    size = (LONG_SIDE_INCHES, LONG_SIDE_INCHES * ratio) if ratio < 1 else (LONG_SIDE_INCHES / ratio, 7.0)
+    figure = Figure(figsize=(max(size[0], 2.5), max(size[1], 2.0) + 0.3), dpi=90, layout="constrained")
+    axes = figure.subplots()
+    draw_maze(axes, problem.maze)
+    axes.set_xlabel("")
+    axes.set_ylabel("")
+    colors = gait_colors(tuple(plan.gaits) + (tuple(execution.gaits) if execution else ()))
+    body = Polygon(np.zeros((3, 2)), closed=True, edgecolor="#202020", linewidth=0.6, zorder=5)
+    axes.add_patch(body)
+    (trail,) = axes.plot([], [], color="#202020", linewidth=0.8, zorder=4)
+    title = axes.set_title("", fontsize=9)
+
+    def draw(frame: int) -> tuple[Any, ...]:
+        k = index[frame]
+        outline = shapely.LineString(lines[k]).buffer(problem.body.half_width_m, quad_segs=6)
+        body.set_xy(np.asarray(outline.exterior.coords))
+        body.set_facecolor(colors[int(gait[k])])
+        trail.set_data(pose[: k + 1, 0], pose[: k + 1, 1])
+        title.set_text(f"{time[k]:5.1f} s   {problem.gaits.gaits[int(gait[k])].name}")
+        return body, trail, title
+
+    animation = FuncAnimation(figure, draw, frames=frames, interval=1000 / FRAMES_PER_S)
+    rate = frames / max(time[-1], 1e-3)
+    movie = path.suffix.lower() == ".mp4"
+    with atomic_path(path) as temporary:
+        animation.save(str(temporary), writer=(FFMpegWriter if movie else PillowWriter)(fps=max(rate, 1)))
+    return path
+
+
+def _motion(plan: Plan, problem: Problem, execution: Execution | None) -> tuple[Any, Any, Any, Any]:
+    """Return times, poses, centre lines and gait indices."""
+    if execution is None:
+        c = plan.certificate
+        return c.time_s, c.pose, c.lines, np.array(plan.gaits)[c.cycle]
+    ends = np.cumsum(problem.motion.period_s[list(execution.gaits)])
+    cycle = np.searchsorted(ends, execution.time_s).clip(0, len(execution.gaits) - 1)
+    return execution.time_s, execution.pose, execution.lines, np.array(execution.gaits)[cycle]

@@ -1,0 +1,62 @@
+"""The interactive page: one self-contained HTML file that works offline."""
+
+from __future__ import annotations
+
+import json
+from functools import lru_cache
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from srs_opt.document import load_schema, read_json, validate
+from srs_opt.errors import InputError
+from srs_opt.files import write_text
+
+if TYPE_CHECKING:
+    from jinja2 import Template
+
+MOTION = "motion.json"
+
+
+def find_motion(path: Path) -> Path:
+    """Return the motion.json that `path`, a folder of the command plan or the file itself, stands for.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    file = path / MOTION if path.is_dir() else path
+    if not file.is_file():
+        raise InputError(f"{file}: no such file (expected a folder that `plan MAZE --out DIR` has filled)")
+    return file
+
+
+def read_motion(file: Path) -> dict[str, Any]:
+    """Read and check a motion.json.
+
+    Raises
+    ------
+    InputError
+        If it is something else, or of another version.
+    """
+    document = read_json(file, "a motion (JSON of the command plan)")
+    validate(document, load_schema("planners.view", "motion.schema.json"))
+    record: dict[str, Any] = document.value
+    return record
+
+
+def save_page(motion: dict[str, Any], path: Path) -> Path:
+    """Write the page of a motion."""
+    # '<' never stands in the data as such, so that no name can end the script
+    data = json.dumps(motion, separators=(",", ":")).replace("<", "\\u003c")
+    title = f"{motion['robot']} in {motion['maze']['name'] or 'a maze'}"
+    return write_text(path, _template().render(title=title, data=data))
+
+
+@lru_cache(maxsize=1)
+def _template() -> Template:
+    from jinja2 import Environment
+
+    text = resources.files("planners.view").joinpath("page.html.jinja").read_text(encoding="utf-8")
+    return Environment(autoescape=True).from_string(text)

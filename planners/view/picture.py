@@ -1,0 +1,134 @@
+"""The maze with the swept body coloured by gait, and the clearance along the way."""
+
+from __future__ import annotations
+
+from itertools import groupby
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from planners.maze.draw import draw_maze
+from planners.plan.answer import Plan
+from planners.search.problem import Problem
+from srs_opt.figures import styled
+from srs_opt.files import atomic_path
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+BODY_STEP_S = 0.04  # between the bodies whose union is the swept region
+PATH = "#202020"
+
+
+@styled
+def save_plan_picture(path: Path, problem: Problem, plan: Plan, driven: NDArray[Any] | None = None) -> Path:
+    """Write the picture of a plan (PNG): maze with swept body above, clearance below.
+
+    Parameters
+    ----------
+    path : Path
+    problem : Problem
+    plan : Plan
+    driven : array (n, 2), optional
+        Way of the centre of mass when it was driven.
+    """
+    from matplotlib.figure import Figure
+
+    ratio = problem.maze.height_m / problem.maze.width_m
+    figure = Figure(figsize=(9, min(max(9 * ratio, 2.5), 12) + 2.6), layout="constrained")
+    above, below = figure.subplots(2, 1, height_ratios=(max(4 * ratio, 1.4), 1))
+    draw_maze(above, problem.maze)
+    colors = draw_swept(above, problem, plan)
+    c = plan.certificate
+    above.plot(c.pose[:, 0], c.pose[:, 1], color=PATH, linewidth=0.8, zorder=4, label="centre of mass")
+    if driven is not None:
+        above.plot(driven[:, 0], driven[:, 1], "--", color="#c0392b", linewidth=1, zorder=5, label="driven")
+    above.legend(
+        loc="upper left",
+        bbox_to_anchor=(1.0, 1.0),
+        fontsize=7,
+        title=f"{problem.maze.name}: {plan.duration_s:.1f} s, {plan.length_m:.2f} m",
+        title_fontsize=8,
+    )
+    draw_clearance(below, problem, plan, colors)
+    with atomic_path(path) as temporary:
+        figure.savefig(temporary, dpi=130)
+    return path
+
+
+def gait_colors(gaits: tuple[int, ...]) -> dict[int, Any]:
+    """Return a colour for every gait used."""
+    import matplotlib
+
+    used = list(dict.fromkeys(gaits))
+    palette = matplotlib.colormaps["tab20"]
+    return {gait: palette(k % 20) for k, gait in enumerate(used)}
+
+
+def draw_swept(axes: Axes, problem: Problem, plan: Plan) -> dict[int, Any]:
+    """Fill the region that the body sweeps, coloured by gait; return the colours."""
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path as Outline
+
+    colors = gait_colors(plan.gaits)
+    c = plan.certificate
+    labelled: set[int] = set()
+    first = 0
+    for gait, run in groupby(plan.gaits):
+        count = len(list(run))
+        inside = (c.cycle >= first) & (c.cycle < first + count)
+        first += count
+        instants = _thinned(c.time_s, np.flatnonzero(inside))
+        if not instants.size:
+            continue
+        bodies = shapely.buffer(
+            shapely.linestrings(c.lines[instants]), problem.body.half_width_m, quad_segs=6
+        )
+        region = shapely.union_all(bodies)
+        rings = [
+            Outline(np.asarray(ring.coords), closed=True)
+            for part in shapely.get_parts(region)
+            for ring in (part.exterior, *part.interiors)
+        ]
+        label = None if gait in labelled else problem.gaits.gaits[gait].name
+        labelled.add(gait)
+        axes.add_patch(
+            PathPatch(
+                Outline.make_compound_path(*rings),
+                facecolor=colors[gait],
+                alpha=0.55,
+                linewidth=0,
+                label=label,
+                zorder=1,
+            )
+        )
+    return colors
+
+
+def draw_clearance(axes: Axes, problem: Problem, plan: Plan, colors: dict[int, Any]) -> None:
+    """Draw the body's clearance over time, coloured by gait, with the margin."""
+    c = plan.certificate
+    room = 1e3 * np.minimum(c.room_m, 0.1)
+    first = 0
+    for gait, run in groupby(plan.gaits):
+        count = len(list(run))
+        inside = (c.cycle >= first) & (c.cycle < first + count)
+        first += count
+        axes.plot(c.time_s[inside], room[inside], color=colors[gait], linewidth=1.2)
+    axes.axhline(1e3 * problem.margin_m, color="#c0392b", linewidth=0.8, linestyle="--")
+    axes.set_ylim(bottom=0)
+    axes.set_xlabel("time (s)")
+    axes.set_ylabel("clearance (mm)")
+    axes.set_title("clearance of the body; dashed: margin; above 100 mm not shown", fontsize=8)
+
+
+def _thinned(time_s: NDArray[Any], instants: NDArray[Any]) -> NDArray[Any]:
+    """Return instants about BODY_STEP_S apart."""
+    if not instants.size:
+        return instants
+    wanted = np.arange(time_s[instants[0]], time_s[instants[-1]] + BODY_STEP_S, BODY_STEP_S)
+    near = np.searchsorted(time_s[instants], wanted).clip(0, instants.size - 1)
+    return instants[np.unique(near)]

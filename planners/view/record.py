@@ -1,0 +1,134 @@
+"""What a page or another program needs to replay a run: maze, body, gaits and clearance, in one JSON file."""
+
+from __future__ import annotations
+
+import base64
+import io
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from planners.maze.maze import Maze
+from planners.plan.answer import Plan
+from planners.plan.certify import clearances
+from planners.search.problem import Problem
+from srs_opt.files import write_text
+
+if TYPE_CHECKING:
+    from planners.drive.execute import Execution
+    from srs_opt.gait_opt.table import TableGait
+
+VERSION = 1
+FRAME_S = 1 / 30
+MOST_FRAMES = 6000
+SHOWN_CLEARANCE_M = 0.1
+Array = NDArray[np.float64]
+
+
+def save_motion(path: Path, problem: Problem, plan: Plan, execution: Execution | None = None) -> Path:
+    """Write the plan's motion, and that of its execution where there is one, as motion.json."""
+    import json
+
+    record = motion_record(problem, plan, execution)
+    return write_text(path, json.dumps(record, separators=(",", ":"), allow_nan=False) + "\n")
+
+
+def motion_record(problem: Problem, plan: Plan, execution: Execution | None = None) -> dict[str, Any]:
+    """Return the JSON object of motion.json (schema: motion.schema.json)."""
+    c = plan.certificate
+    runs = [_run("planned", problem, plan.gaits, c.time_s, c.pose, c.lines)]
+    if execution is not None:
+        e = execution
+        runs.append(_run("driven", problem, e.gaits, e.time_s, e.pose, e.lines) | {"outcome": e.reason})
+    used = sorted({gait for run in runs for gait, _ in run["cycles"]})
+    for run in runs:
+        run["cycles"] = [[used.index(gait), start] for gait, start in run["cycles"]]
+    return {
+        "version": VERSION,
+        "robot": problem.robot.name,
+        "body_width_m": problem.robot.body_width_m,
+        "margin_m": problem.margin_m,
+        "maze": _maze(problem.maze),
+        "gaits": [_gait(problem.gaits.gaits[k]) for k in used],
+        "runs": runs,
+    }
+
+
+def _run(
+    name: str, problem: Problem, gaits: Sequence[int], time_s: Array, pose: Array, lines: Array
+) -> dict[str, Any]:
+    """Return one motion at even instants: body in tenths of a millimetre, clearance in millimetres."""
+    count = min(MOST_FRAMES, max(2, math.ceil(float(time_s[-1]) / FRAME_S) + 1))
+    instants = np.linspace(0.0, float(time_s[-1]), count)
+    after = np.searchsorted(time_s, instants).clip(1, len(time_s) - 1)
+    before = after - 1
+    step = time_s[after] - time_s[before]
+    share = np.divide(instants - time_s[before], step, out=np.zeros(count), where=step > 0).clip(0, 1)
+    body = lines[before] + share[:, None, None] * (lines[after] - lines[before])
+    centre = pose[before] + share[:, None] * (pose[after] - pose[before])
+    room = clearances(problem, body, SHOWN_CLEARANCE_M).clip(max=SHOWN_CLEARANCE_M)
+    starts = np.concatenate([[0.0], np.cumsum(problem.motion.period_s[list(gaits)])[:-1]])
+    return {
+        "name": name,
+        "duration_s": round(float(time_s[-1]), 5),
+        "cycles": [[int(g), round(float(t), 5)] for g, t in zip(gaits, starts) if t < time_s[-1]],
+        "centre": np.round(1e4 * centre[:, :2]).astype(int).tolist(),
+        "body": np.round(1e4 * body).astype(int).reshape(count, -1).tolist(),
+        "clearance_mm": np.round(1e3 * room, 2).tolist(),
+    }
+
+
+def _gait(entry: TableGait) -> dict[str, Any]:
+    return {
+        "name": entry.name,
+        "period_s": entry.gait.period_s,
+        "pressure_kpa": entry.gait.pressure_kpa,
+        "intervals": [[list(pair) for pair in pairs] for pairs in entry.gait.intervals],
+        "speed_m_s": entry.speed_m_s,
+        "turn_rate_rad_s": entry.turn_rate_rad_s,
+    }
+
+
+def _maze(maze: Maze) -> dict[str, Any]:
+    rings = []
+    if len(maze.walls):
+        inside = maze.walls.union & shapely.box(*maze.bounds)
+        rings = [
+            np.round(np.asarray(ring.coords), 5).tolist()
+            for part in shapely.get_parts(inside)
+            if part.geom_type == "Polygon"
+            for ring in (part.exterior, *part.interiors)
+        ]
+    start, goal = maze.start, maze.goal
+    return {
+        "name": maze.name,
+        "bounds": list(maze.bounds),
+        "rings": rings,
+        "cells": _cells(maze),
+        "start": start and [start.x, start.y, start.heading],
+        "goal": goal
+        and {"x": goal.x, "y": goal.y, "radius": goal.radius, "boxes": [list(b) for b in goal.boxes]},
+    }
+
+
+def _cells(maze: Maze) -> dict[str, Any] | None:
+    """Return occupied cells as a transparent picture, its lower left corner, turn and size."""
+    raster = maze.raster
+    if raster is None:
+        return None
+    from PIL import Image
+
+    alpha = Image.fromarray((raster.occupied[::-1] * np.uint8(255)).astype(np.uint8))
+    picture = Image.merge("LA", (Image.new("L", alpha.size, 0x3A), alpha))
+    stream = io.BytesIO()
+    picture.save(stream, "PNG", optimize=True)
+    return {
+        "png": base64.b64encode(stream.getvalue()).decode("ascii"),
+        "origin": [raster.origin.x, raster.origin.y, raster.origin.heading],
+        "size": list(raster.size_m),
+    }
