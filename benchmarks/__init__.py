@@ -1,0 +1,1 @@
+"""Measured speed, accuracy and growth; see README.md."""

@@ -1,0 +1,79 @@
+"""What a benchmark returns, and how to time on a machine that others use too."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+PICTURES = Path(__file__).parent / "pictures"
+
+
+@dataclass(frozen=True)
+class Section:
+    """One benchmark's part of the report.
+
+    Attributes
+    ----------
+    title : str
+    columns, rows
+        The table; cells are text.
+    notes : sequence of str
+        Paragraphs below it.
+    ratios : dict
+        Named numbers that hold on any machine; smaller is better.
+    pictures : sequence of Path
+        PNG files.
+    """
+
+    title: str
+    columns: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    notes: Sequence[str] = ()
+    ratios: dict[str, float] = field(default_factory=dict)
+    pictures: Sequence[Path] = ()
+
+    def markdown(self) -> str:
+        lines = [f"## {self.title}", "", "| " + " | ".join(self.columns) + " |"]
+        lines.append("|" + " --- |" * len(self.columns))
+        lines += ["| " + " | ".join(row) + " |" for row in self.rows]
+        for note in self.notes:
+            lines += ["", note]
+        if self.ratios:
+            lines += ["", "Ratios: " + ", ".join(f"{k} {v:.3g}" for k, v in self.ratios.items()) + "."]
+        for picture in self.pictures:
+            lines += ["", f"![{picture.stem}](pictures/{picture.name})"]
+        return "\n".join(lines) + "\n"
+
+
+def best_time(work: Callable[[], object], tries: int = 5, *, processor: bool = True) -> float:
+    """Return the shortest of several runs, s: processor time, or wall time where other processes work."""
+    clock = time.process_time if processor else time.perf_counter
+    times = []
+    for _ in range(tries):
+        started = clock()
+        work()
+        times.append(clock() - started)
+    return min(times)
+
+
+def exponent(sizes: Sequence[float], costs: Sequence[float]) -> float:
+    """Return the slope of log cost over log size."""
+    return float(np.polyfit(np.log(sizes), np.log(costs), 1)[0])
+
+
+def growth_picture(name: str, x: str, curves: dict[str, tuple[Sequence[float], Sequence[float]]]) -> Path:
+    """Draw costs over sizes, both logarithmic, with their exponents in the legend; return the PNG."""
+    from srs_opt.figures import new_figure, save_figure
+
+    figure, axes = new_figure()
+    for label, (sizes, costs) in curves.items():
+        axes.loglog(sizes, costs, "o-", markersize=3, label=f"{label}: exponent {exponent(sizes, costs):.2f}")
+    axes.set_xlabel(x)
+    axes.set_ylabel("cost (s)")
+    axes.legend()
+    png, _ = save_figure(figure, PICTURES / name)
+    return png

@@ -1,0 +1,77 @@
+"""Slopes of the predicted picture against differences of the prediction itself."""
+
+import numpy as np
+import pytest
+
+from srs_opt.calibrate.coordinates import all_candidates, base_coordinates
+from srs_opt.calibrate.fit import Experiment, Point, start_point
+from srs_opt.calibrate.model import Model
+from srs_opt.measurement.records import Trial
+from srs_opt.robot import wpi_srs
+
+FINE_M_S = 2e-8
+
+
+@pytest.fixture(scope="module")
+def setting():
+    robot = wpi_srs()
+    time_s = np.arange(120) / 100
+    blank = np.zeros((time_s.size, robot.links, 2))
+    trial = Trial("t", 1.5, 48.0, 0.4, np.pi / 2, 0.7, 1.2, time_s, markers_m=blank)
+    experiment = Experiment(Model(robot), [trial], 0.001)
+    base = base_coordinates(robot)
+    sizes = tuple(c for k in all_candidates(robot.links) for c in k.sizes)
+    values = {**start_point(base).values, "curvature_bias.bias": 0.5, "camera_scale.scale": 0.02}
+    slopes = experiment.predict(trial, Point(values), (*base, *sizes), FINE_M_S).slopes
+    return experiment, trial, values, (*base, *sizes), slopes
+
+
+# slopes are of order 2 in the step: a few per mille here, enough for Gauss-Newton to converge
+@pytest.mark.parametrize(
+    "name",
+    [
+        "friction_tangential",
+        "friction_normal",
+        "curvature_per_pressure_1_m_kpa",
+        "tau1_s",
+        "gap_length.extra_m",
+        "gap_bending.ratio",
+        "segment_bias.bias[3]",
+        "single_wheel_toe.angle[2]",
+        "head_mass.extra_kg",
+        "tether_drag.force_n",
+        "slip_rate.per_speed",
+        "curvature_stiffening.per_curv2",
+        "hysteresis.ratio",
+        "fill_exhaust_asymmetry.ratio",
+        "supply_droop.per_hz",
+        "floor_slope.x",
+        "marker_offset.dy_m",
+        "camera_tilt.per_m",
+        "clock_offset.offset_s",
+    ],
+)
+def test_slopes_are_those_of_the_prediction(setting, name):
+    experiment, trial, values, coordinates, slopes = setting
+    k = [c.name for c in coordinates].index(name)
+    h = 2e-3 * coordinates[k].typical
+    ends = [
+        experiment.predict(trial, Point({**values, name: values.get(name, 0.0) + s * h}), (), FINE_M_S).points
+        for s in (1, -1)
+    ]
+    difference = (ends[0] - ends[1]) / (2 * h)
+    error = np.linalg.norm(slopes[:, :, k] - difference) / np.linalg.norm(difference)
+    assert error < 0.06
+
+
+def test_a_dead_time_is_a_late_clock(setting):
+    experiment, trial, values, coordinates, slopes = setting
+    names = [c.name for c in coordinates]
+    late, clock = (slopes[:, :, names.index(n)] for n in ("dead_time.delay_s", "clock_offset.offset_s"))
+    assert late == pytest.approx(-clock)
+    plain = {
+        k: v for k, v in values.items() if "bias" not in k
+    }  # a bias acts from time 0 whatever the valves do
+    delayed = experiment.predict(trial, Point({**plain, "dead_time.delay_s": 0.03}), (), FINE_M_S).points
+    shifted = experiment.predict(trial, Point({**plain, "clock_offset.offset_s": -0.03}), (), FINE_M_S).points
+    assert np.abs(delayed - shifted).max() < 1e-6

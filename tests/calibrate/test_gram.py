@@ -1,0 +1,59 @@
+"""The normal equations against dense linear algebra."""
+
+import numpy as np
+import pytest
+from scipy import optimize
+
+from srs_opt.calibrate.gram import bounded_solve, trial_gram
+
+
+def problem(seed=0, n=200, k=5):
+    rng = np.random.default_rng(seed)
+    slopes = rng.standard_normal((n, k))
+    residual = slopes @ rng.standard_normal(k) * 0.1 + 0.3 * rng.standard_normal(n)
+    return slopes, residual
+
+
+def test_eliminating_the_scatter_is_what_the_marginal_covariance_says():
+    slopes, residual = problem()
+    scatter_sd = np.array([0.2, 0.5])
+    gram = trial_gram(residual, slopes, 0.3, (1, 3), scatter_sd, np.zeros(2))
+    part = slopes[:, [1, 3]] * scatter_sd
+    covariance = 0.09 * np.eye(len(residual)) + part @ part.T
+    weight = np.linalg.inv(covariance)
+    both = np.column_stack([slopes, residual])
+    assert gram.eliminated().matrix == pytest.approx(both.T @ weight @ both, rel=1e-8, abs=1e-8)
+    log_det = np.linalg.slogdet(covariance)[1] - len(residual) * np.log(0.09)
+    assert gram.eliminated().log_det == pytest.approx(log_det)
+
+
+def test_scatter_at_the_point_is_carried_along():
+    slopes, residual = problem()
+    sd, now = np.array([0.2, 0.5]), np.array([0.1, -0.3])
+    shifted = residual - slopes[:, [1, 3]] @ now
+    at_zero = trial_gram(residual, slopes, 0.3, (1, 3), sd, np.zeros(2)).eliminated()
+    moved = trial_gram(shifted, slopes, 0.3, (1, 3), sd, now).eliminated()
+    assert moved.matrix == pytest.approx(at_zero.matrix, rel=1e-8, abs=1e-6)
+
+
+def test_lost_values_do_not_count():
+    slopes, residual = problem()
+    holes = residual.copy()
+    holes[::3] = np.nan
+    seen = np.isfinite(holes)
+    with_holes = trial_gram(holes, slopes, 0.3, (0,), np.ones(1), np.zeros(1))
+    without = trial_gram(residual[seen], slopes[seen], 0.3, (0,), np.ones(1), np.zeros(1))
+    assert with_holes.raw == pytest.approx(without.raw)
+    assert with_holes.count == seen.sum()
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_bounds_are_those_of_a_general_solver(seed):
+    slopes, residual = problem(seed)
+    lower = np.array([-0.02, -np.inf, 0.0, -np.inf, 0.01])
+    gram = trial_gram(residual, slopes, 1.0, (), np.zeros(0), np.zeros(0)).eliminated()
+    none = np.zeros(5)
+    mine = bounded_solve(gram.matrix, range(5), none, none, lower)
+    theirs = optimize.lsq_linear(slopes, residual, (lower, np.full(5, np.inf)), tol=1e-12)
+    assert mine.deviance == pytest.approx(2 * theirs.cost, rel=2e-3)
+    assert np.all(mine.step >= lower - 1e-12)

@@ -1,0 +1,215 @@
+"""The optimizer reaches what is known to be possible, honours what was asked, and proves it."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from srs_opt.errors import InputError
+from srs_opt.gait import Gait, Wave, published_wave
+from srs_opt.gait_opt.__main__ import main
+from srs_opt.gait_opt.aim import aimed, end_for_end, evened, leaned, on_ticks, within
+from srs_opt.gait_opt.certificate import certify, periodicity_gap, self_clearance_m
+from srs_opt.gait_opt.collocation.problem import CycleProblem
+from srs_opt.gait_opt.goal import Goal, Limits, air_work_j, chamber_volume_m3
+from srs_opt.gait_opt.report import wave_parameters
+from srs_opt.gait_opt.search import search
+from srs_opt.orbit.steady import steady_gait
+from srs_opt.robot import wpi_srs
+from srs_opt.simulate.integrate import Integrator
+from srs_opt.simulate.timeline import Timeline
+
+ROBOT = wpi_srs()
+KNOWN_BEST_M_S = 0.547  # found by CMA-ES in 1,500 evaluations
+
+
+@pytest.fixture(scope="module")
+def fastest(tmp_path_factory):
+    """The command's answer from the published gait as the only start."""
+    folder = tmp_path_factory.mktemp("gait")
+    assert main(["--starts", "1", "--out", str(folder), "--quiet"]) == 0
+    return json.loads((folder / "gait.json").read_text()), folder
+
+
+def test_fastest_gait_from_the_published_one_alone(fastest):
+    answer, _ = fastest
+    assert answer["speed_m_s"] >= 0.998 * KNOWN_BEST_M_S
+    assert answer["certificate"]["passed"]
+    assert answer["certificate"]["relative_error"] < 0.005
+    assert answer["baseline"]["speed_m_s"] == pytest.approx(0.2315, rel=0.01)
+
+
+def test_fastest_gait_holds_up_in_a_simulation_from_rest(fastest):
+    answer, _ = fastest
+    pairs = tuple(((s["on_s"], s["off_s"]),) for s in answer["switches"])
+    gait = Gait(1 / answer["frequency_hz"], answer["pressure_kpa"], pairs)
+    run = Integrator(ROBOT)
+    path = run.run(Timeline.of_gait(gait, 30 * gait.period_s), run.rest())
+    late = np.searchsorted(path.time_s, [20 * gait.period_s - 1e-9, 30 * gait.period_s - 1e-9])
+    travelled = np.hypot(*(path.pose[late[1]] - path.pose[late[0]])[:2])
+    assert travelled / (10 * gait.period_s) == pytest.approx(answer["speed_m_s"], rel=2e-3)
+
+
+def test_answer_is_what_the_interface_says(fastest):
+    answer, folder = fastest
+    keys = (
+        "objective speed_m_s turn_rate_rad_s radius_m cost_of_transport envelope_m frequency_hz pressure_kpa"
+    )
+    keys += " phase_rad offset switches baseline certificate starts iterations solve_s compile_s"
+    assert set(keys.split()) <= set(answer)
+    assert {p.name for p in folder.iterdir()} >= {"gait.json", "gait.png", "convergence.png"}
+    wave = Wave(
+        answer["frequency_hz"], answer["pressure_kpa"], tuple(answer["phase_rad"]), tuple(answer["offset"])
+    ).gait()
+    shift = wave.intervals[0][0][0] - answer["switches"][0]["on_s"]
+    for pairs, switch in zip(wave.intervals, answer["switches"]):
+        assert (pairs[0][0] - shift - switch["on_s"]) % wave.period_s == pytest.approx(0, abs=1e-9)
+
+
+def test_warm_repeat_keeps_moved_limits(fastest, tmp_path):
+    _, folder = fastest
+    limits = ["--pressure", "43", "50", "--frequency", "1", "1.8"]
+    status = main(["--warm", str(folder / "gait.json"), *limits, "--out", str(tmp_path), "--quiet"])
+    answer = json.loads((tmp_path / "gait.json").read_text())
+    assert status == 0
+    assert answer["frequency_hz"] <= 1.8 * 1.002
+    assert answer["pressure_kpa"] >= 43
+    assert answer["speed_m_s"] > 0.48
+
+
+@pytest.mark.slow
+def test_wanted_radius_and_band():
+    goal = Goal("turn", radius_m=-0.35, envelope_m=0.08)
+    problem = CycleProblem((ROBOT,), "complex", goal, Limits(pressure_kpa=(30.0, 55.0)))
+    found = search(problem, starts=1)
+    assert found.certificate.passed, found.certificate.failures
+    assert found.orbits[0].radius_m == pytest.approx(-0.35, rel=0.02)
+    assert sum(found.orbits[0].envelope_m) <= 0.0808
+    assert found.orbits[0].speed_m_s > 0.45
+
+
+@pytest.mark.slow
+def test_one_gait_for_robots_with_other_friction():
+    robots = tuple(
+        ROBOT.with_values(friction_normal=0.57 * f, friction_tangential=0.043 / f) for f in (1.0, 0.7)
+    )
+    limits = Limits()
+    together = search(CycleProblem(robots, "complex", Goal(), limits), starts=1)
+    worst = min(o.speed_m_s for o in together.orbits)
+    alone = search(CycleProblem(robots[:1], "complex", Goal(), limits), starts=1)
+    other = steady_gait(robots[1], alone.gait)
+    assert worst >= other.speed_m_s - 2e-3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(3))
+def test_random_robots_need_no_tuning(seed):
+    """Links, friction ratio and time constants drawn at random: the gait beats the published one."""
+    random = np.random.default_rng(seed)
+    normal = random.uniform(0.3, 0.9)
+    robot = ROBOT.with_values(
+        links=int(random.integers(3, 7)),
+        friction_normal=normal,
+        friction_tangential=normal / math.exp(random.uniform(math.log(3), math.log(30))),
+        tau1_s=random.uniform(0.04, 0.15),
+        tau2_s=random.uniform(0.02, 0.1),
+    )
+    found = search(CycleProblem((robot,), "complex", Goal(), Limits()), starts=2, seed=seed)
+    published = steady_gait(robot, published_wave(robot, 2.0, 55.0).gait())
+    assert found.certificate.passed, found.certificate.failures
+    assert found.orbits[0].speed_m_s > published.speed_m_s
+
+
+def test_interrupted_search_keeps_the_best():
+    told = []
+
+    def say(text):
+        told.append(text)
+        if text.startswith("start 2"):
+            raise KeyboardInterrupt
+
+    found = search(CycleProblem((ROBOT,), "complex", Goal(), Limits()), starts=2, say=say)
+    assert found.interrupted
+    assert found.orbits[0].speed_m_s > 0.23
+
+
+def test_certificate_finds_faults():
+    gait = on_ticks(published_wave(ROBOT, 2.0, 50.0).gait(), 0.001)
+    problem = CycleProblem(
+        (ROBOT,), "complex", Goal(envelope_m=0.05), Limits(min_dwell_s=0.24, max_curvature_1_m=10)
+    )
+    certificate, _ = certify(problem, gait, 0.3)
+    words = " ".join(certificate.failures)
+    assert not certificate.passed
+    for fault in ("optimizer's 0.3000", "curvature reaches", "swept band"):
+        assert fault in words
+    tight = CycleProblem((ROBOT,), "complex", Goal(), Limits(min_dwell_s=0.2499))
+    assert certify(tight, leaned(gait, 0.05), 0.2)[0].dwell_ok is False
+
+
+def test_periodicity_gap_sees_a_motion_that_is_not_periodic():
+    gait = published_wave(ROBOT, 2.0, 50.0).gait()
+    orbit = steady_gait(ROBOT, gait)
+    assert periodicity_gap(ROBOT, gait, "complex", orbit, 5) < 3e-4
+    assert periodicity_gap(ROBOT, published_wave(ROBOT, 2.0, 42.0).gait(), "complex", orbit, 5) > 1e-2
+
+
+def test_self_clearance_of_a_long_robot():
+    long = ROBOT.with_values(links=12)
+    coiled = Wave(1.0, 55.0, (0.0,) * 11, (0.0,) * 11).gait()
+    assert self_clearance_m(long, steady_gait(long, coiled)) < 0
+    assert self_clearance_m(ROBOT, steady_gait(ROBOT, published_wave(ROBOT).gait())) > 0
+
+
+def test_aiming_hits_a_turn_rate():
+    gait = published_wave(ROBOT, 2.0, 50.0).gait()
+    hit = aimed(gait, lambda g: steady_gait(ROBOT, g).turn_rate_rad_s - 0.6, 1e-2)
+    assert steady_gait(ROBOT, hit).turn_rate_rad_s == pytest.approx(0.6, abs=0.011)
+
+
+def test_end_for_end_backs_up_exactly():
+    gait = Wave(1.9, 45.0, (0.2, 1.0, 1.9, 2.6), (0.1, 0.2, 0.15, 0.3)).gait()
+    there, back = steady_gait(ROBOT, gait), steady_gait(ROBOT, end_for_end(gait))
+    assert back.speed_m_s == pytest.approx(-there.speed_m_s, rel=1e-3)
+    assert back.turn_rate_rad_s == pytest.approx(there.turn_rate_rad_s, rel=2e-3)
+
+
+def test_ticks_and_limits():
+    gait = Wave(1.97, 45.0, (0.2, 1.0, 1.9, 2.6), (0.0, 0.0, 0.0, 0.0)).gait()
+    played = on_ticks(evened(gait), 0.001, (1.0, 2.0))
+    assert played.period_s == pytest.approx(0.508)
+    for ((on, off),) in played.intervals:
+        assert (off - on) % played.period_s == pytest.approx(played.period_s / 2)
+    slower = within(Limits((1.0, 1.5), (50.0, 55.0)), gait)
+    assert slower.frequency_hz == pytest.approx(1.5)
+    assert slower.pressure_kpa == 50
+    assert wave_parameters(slower)[1] == pytest.approx([0, 0, 0, 0], abs=1e-9)
+
+
+def test_air_is_counted_by_fills():
+    volume = chamber_volume_m3(ROBOT)
+    assert volume == pytest.approx(1.3e-6, rel=0.02)
+    assert air_work_j(4, 50.0, volume) == pytest.approx(8 * volume * 50e3)
+
+
+@pytest.mark.parametrize(
+    ("options", "word"),
+    [
+        (["--objective", "slim"], "--speed"),
+        (["--radius", "0.3", "--turn-rate", "1"], "not both"),
+        (["--min-dwell", "0.6"], "dwell"),
+        (["--pressure", "50", "40"], "pressure"),
+        (["--radius", "0"], "radius"),
+    ],
+)
+def test_bad_wishes_are_refused_in_one_line(options, word, capsys, tmp_path):
+    assert main([*options, "--out", str(tmp_path)]) == 2
+    error = capsys.readouterr().err
+    assert word in error
+    assert error.count("\n") == 1
+
+
+def test_unknown_objective():
+    with pytest.raises(InputError, match="objective"):
+        Goal("fly")

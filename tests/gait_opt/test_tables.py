@@ -1,0 +1,133 @@
+"""Gait tables: what ships, what controllers get, and the C player tick by tick."""
+
+import csv
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from srs_opt.errors import InputError
+from srs_opt.gait_opt.catalogue import default_table, shipped_table
+from srs_opt.gait_opt.export import c_header, write_csv, write_header
+from srs_opt.gait_opt.family import chains, wishes
+from srs_opt.gait_opt.table import GaitTable, load_table, save_table
+from srs_opt.gait_opt.ticks import LEFT_BIT, RIGHT_BIT, Schedule
+from srs_opt.orbit.steady import steady_gait
+from srs_opt.robot import wpi_srs
+
+ROBOT = wpi_srs()
+TICK_S = 0.001
+PLAYER = Path(__file__).resolve().parents[2] / "examples" / "gait_player" / "player.c"
+
+
+@pytest.fixture(scope="module")
+def table() -> GaitTable:
+    return shipped_table()
+
+
+def test_shipped_table_holds_what_a_planner_needs(table):
+    assert len(table.gaits) >= 60
+    straight = [g for g in table.gaits if g.radius_m is None]
+    assert max(g.speed_m_s for g in straight) >= 0.545
+    assert min(g.speed_m_s for g in straight) <= -0.545
+    assert any(sum(g.envelope_m) <= 0.0705 and g.speed_m_s > 0.4 for g in straight)
+    for side in (1, -1):
+        radii = [side * g.radius_m for g in table.gaits if g.radius_m and side * g.radius_m > 0]
+        assert min(radii) < 0.12
+        assert max(radii) > 0.7
+
+
+def test_shipped_gaits_do_what_the_table_says(table):
+    for entry in table.gaits[:: max(len(table.gaits) // 8, 1)]:
+        orbit = steady_gait(ROBOT, entry.gait)
+        assert orbit.speed_m_s == pytest.approx(entry.speed_m_s, rel=2e-3)
+        assert orbit.turn_rate_rad_s == pytest.approx(entry.turn_rate_rad_s, abs=5e-3)
+        assert sum(orbit.envelope_m) == pytest.approx(sum(entry.envelope_m), rel=2e-2)
+
+
+def test_images_are_mirror_images(table):
+    left = {g.name: g for g in table.gaits if g.name.endswith(" left") and "back" not in g.name}
+    for name, entry in left.items():
+        other = table[name.replace("left", "right")]
+        assert other.speed_m_s == pytest.approx(entry.speed_m_s, rel=1e-3)
+        assert other.turn_rate_rad_s == pytest.approx(-entry.turn_rate_rad_s, rel=2e-3)
+        assert other.envelope_m == pytest.approx(entry.envelope_m[::-1], rel=1e-2)
+
+
+def test_default_table_of_the_built_in_robot(table):
+    assert default_table(ROBOT).fingerprint == table.fingerprint
+
+
+def test_table_of_another_robot_is_refused(table, tmp_path):
+    path = save_table(table, tmp_path / "table.json")
+    with pytest.raises(InputError, match="rebuild"):
+        load_table(path, ROBOT.with_values(tau1_s=0.1))
+
+
+def test_wishes_come_in_chains_by_band():
+    assert sum(map(len, chains(ROBOT))) == len(wishes(ROBOT))
+    for chain in chains(ROBOT):
+        assert len({w.band_m for w in chain}) == 1
+
+
+def test_csv_has_a_row_per_interval(table, tmp_path):
+    with write_csv(table, tmp_path / "t.csv").open() as stream:
+        rows = list(csv.DictReader(stream))
+    assert len(rows) == sum(len(p) for g in table.gaits for p in g.gait.intervals)
+    assert float(rows[0]["speed_m_s"]) == table.gaits[0].speed_m_s
+
+
+def test_schedule_is_the_gait_at_every_tick(table):
+    for entry in table.gaits[::7]:
+        schedule = Schedule.of_gait(entry.gait, TICK_S)
+        for tick in range(schedule.period):
+            states = entry.gait.valve((tick + 0.5) * TICK_S)
+            mask = sum((LEFT_BIT if s > 0 else RIGHT_BIT) << (2 * i) for i, s in enumerate(states))
+            assert schedule.mask(tick) == mask
+
+
+def test_schedule_refuses_times_between_ticks(table):
+    with pytest.raises(InputError, match="ticks"):
+        Schedule.of_gait(table.gaits[0].gait, 0.0037)
+
+
+@pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
+def test_player_in_c_plays_every_tick(table, tmp_path):
+    write_header(table, tmp_path / "gait_table.h", TICK_S)
+    program = tmp_path / "player"
+    flags = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-I", str(tmp_path)]
+    subprocess.run(["cc", *flags, str(PLAYER), "-o", str(program)], check=True)
+    for entry in table.gaits[::9]:
+        speed, turn = round(1e3 * entry.speed_m_s), round(1e3 * entry.turn_rate_rad_s)
+        schedule = Schedule.of_gait(entry.gait, TICK_S)
+        ticks = 2 * schedule.period + 17
+        done = subprocess.run(
+            [str(program), str(speed), str(turn), str(ticks)], capture_output=True, text=True, check=True
+        )
+        played = table[done.stderr.strip()]
+        assert (played.speed_m_s, played.turn_rate_rad_s) == pytest.approx(
+            (entry.speed_m_s, entry.turn_rate_rad_s), abs=0.02
+        )
+        schedule = Schedule.of_gait(played.gait, TICK_S)
+        lines = done.stdout.split()
+        assert lines[-1] == "-" * ROBOT.segments
+        expected = [
+            "".join("-LR"[schedule.mask(t) >> (2 * i) & 3] for i in range(ROBOT.segments))
+            for t in range(ticks)
+        ]
+        assert lines[:-1] == expected
+
+
+def test_header_never_opens_both_valves(table):
+    text = c_header(table, TICK_S)
+    masks = [int(word, 16) for word in re.findall(r"\{(0x[0-9a-f]+)u\}", text)]
+    assert masks
+    assert all(mask & (mask >> 1) & 0x55555555 == 0 for mask in masks)
+
+
+def test_nearest_gait(table):
+    assert table.nearest(0.55, 0.0).speed_m_s > 0.5
+    assert np.sign(table.nearest(0.4, -3.0).turn_rate_rad_s) == -1

@@ -1,0 +1,198 @@
+"""Every failure that a user can meet: exit status 1 or 2, one line on stderr, no traceback."""
+
+import importlib
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+NOT_COMMANDS = {"planners.tour"}
+
+# command, arguments, exit status, what the one line must say ({tmp} is a fresh folder with the files below)
+FILES = {
+    "typo.yaml": "lenght: 3\n",
+    "negative.yaml": "link_mass_kg: -1\n",
+    "text.yaml": "links: five\n",
+    "twice.yaml": "links: 5\nlinks: 6\n",
+    "effect.yaml": "effects: [{name: tether_drg, force_n: 0.1}]\n",
+    "place.yaml": "effects: [{name: segment_bias, bias: 1, segment: 9}]\n",
+    "broken.yaml": "links: [5\n",
+    "latin.yaml": b"name: M\xfcller\n",
+    "empty.csv": "",
+    "map.csv": "a,b\n1,2\n",
+    "gait.json": '{"frequency_hz": 2}',
+    "table.json": '{"version": 1, "gaits": []}',
+    "old_table.json": '{"version": 99, "gaits": []}',
+    "motion.json": '{"version": 99}',
+    "walls.yaml": "bounds: [0, 0, 2, 1]\nwalls: [{segmnt: [[0, 0], [1, 1]]}]\nstart: {x: 1, y: 0.5}\n",
+    "in_wall.yaml": "bounds: [0, 0, 2, 1]\nwalls: [{box: [0.4, 0.3, 0.8, 0.7]}]\n"
+    "start: {x: 0.5, y: 0.5}\ngoal: {x: 1.8, y: 0.5, radius: 0.05}\n",
+    "no_goal.yaml": "bounds: [0, 0, 2, 1]\nstart: {x: 0.5, y: 0.5}\n",
+    "ros.yaml": "image: gone.pgm\nresolution: 0.05\norigin: [0, 0, 0]\n",
+    "maze.txt": "o---o\n|   \n",
+    "maze.map": "type octile\nheight 2\nwidth 2\nmap\n..\n",
+    "maze.world": "<sdf><world></sdf>",
+    "set/dataset.yaml": "name: x\nrobot: robot.yaml\nmarkers: sideways\n"
+    "camera: {rate_hz: 100, marker_sd_m: 0.001}\n",
+    "take.csv": "Format Version,1.23\n",
+    "trials.csv": "trial,frequency_hz\na,1\n",
+}
+CASES = [
+    ("srs_opt.simulate", ["--frequency", "fast"], 2, "expected a finite number"),
+    ("srs_opt.simulate", ["--frequency", "-1"], 2, "above 0"),
+    ("srs_opt.simulate", ["--frequenzy", "1"], 2, "unrecognized arguments"),
+    ("srs_opt.simulate", ["--offset", "1.2"], 2, "between -1 and 1"),
+    ("srs_opt.simulate", ["--duration", "1e9"], 2, "duration"),
+    ("srs_opt.simulate", ["--robot", "{tmp}/absent.yaml"], 2, "no such file"),
+    ("srs_opt.simulate", ["--robot", "{tmp}"], 2, "is a folder"),
+    ("srs_opt.simulate", ["--robot", "{tmp}/typo.yaml"], 2, "typo.yaml:1: lenght: unknown key"),
+    ("srs_opt.simulate", ["--robot", "{tmp}/negative.yaml"], 2, "greater than 0"),
+    ("srs_opt.simulate", ["--robot", "{tmp}/text.yaml"], 2, "expected a whole number"),
+    ("srs_opt.simulate", ["--robot", "{tmp}/twice.yaml"], 2, "given twice"),
+    ("srs_opt.simulate", ["--robot", "{tmp}/effect.yaml"], 2, "did you mean 'tether_drag'"),
+    ("srs_opt.simulate", ["--robot", "{tmp}/place.yaml"], 2, "segment number from 1"),
+    ("srs_opt.simulate", ["--robot", "{tmp}/broken.yaml"], 2, "not valid YAML"),
+    ("srs_opt.simulate", ["--robot", "{tmp}/latin.yaml"], 2, "not UTF-8"),
+    ("srs_opt.simulate", ["--gait", "{tmp}/empty.csv"], 2, "expected"),
+    ("srs_opt.simulate", ["--gait", "{tmp}/gait.json"], 2, "missing"),
+    ("srs_opt.simulate", ["--gait", "{tmp}/table.json"], 2, "table.json"),
+    ("srs_opt.simulate", ["--gait", "{tmp}/old_table.json:x"], 2, "version"),
+    ("srs_opt.gait_map", ["--frequency", "2", "1", "3"], 2, "LO <= HI"),
+    ("srs_opt.gait_map", ["--frequency", "1", "2"], 2, "expected 3 arguments"),
+    ("srs_opt.gait_map", ["--offset", "1.5"], 2, "between -1 and 1"),
+    ("srs_opt.gait_map", ["--jobs", "0"], 2, "whole number above 0"),
+    ("srs_opt.drive", [], 2, "--speed"),
+    ("srs_opt.drive", ["--speed", "0.1", "--radius", "1", "--turn-rate", "1"], 2, "not both"),
+    ("srs_opt.drive", ["--speed", "0.1", "--map", "{tmp}/map.csv"], 2, "map.csv:1: expected the columns"),
+    ("srs_opt.measurement", ["{tmp}/absent", "--quiet"], 2, "absent"),
+    ("srs_opt.measurement", ["{tmp}/set", "--quiet"], 2, "dataset.yaml"),
+    ("srs_opt.import_motive", ["{tmp}/take.csv"], 2, "--trials"),
+    ("srs_opt.import_motive", ["{tmp}/take.csv", "--trials", "{tmp}/trials.csv"], 2, "trials.csv"),
+    ("planners.plan", ["{tmp}/absent.yaml"], 2, "no such file"),
+    ("planners.plan", ["{tmp}/walls.yaml"], 2, "did you mean 'segment'"),
+    ("planners.plan", ["{tmp}/in_wall.yaml"], 2, "inside a wall"),
+    ("planners.plan", ["{tmp}/no_goal.yaml"], 2, "no goal"),
+    ("planners.plan", ["{tmp}/ros.yaml"], 2, "gone.pgm"),
+    ("planners.plan", ["{tmp}/maze.txt"], 2, "maze.txt"),
+    ("planners.plan", ["{tmp}/maze.map"], 2, "maze.map"),
+    ("planners.plan", ["{tmp}/maze.world"], 2, "maze.world"),
+    ("planners.plan", ["mazes/first.yaml", "--start", "1,2"], 2, "X,Y,HEADING"),
+    ("planners.plan", ["mazes/first.yaml", "--cell", "0.1"], 2, "--scale"),
+    ("planners.plan", ["mazes/first.yaml", "--gaits", "{tmp}/table.json"], 2, "table.json"),
+    ("planners.plan", ["mazes/first.yaml", "--planner", "magic"], 2, "invalid choice"),
+    ("planners.plan", ["mazes/first.yaml", "--margin", "-1"], 2, "--margin"),
+    ("planners.plan", ["mazes/first.yaml", "--animate", "film.avi"], 2, "film.avi"),
+    ("srs_opt.gait_opt", ["--objective", "fame"], 2, "invalid choice"),
+    ("srs_opt.gait_opt", ["--frequency", "2", "1"], 2, "low <= high"),
+    ("srs_opt.gait_opt", ["--objective", "slim"], 2, "--speed"),
+    ("srs_opt.gait_opt", ["--radius", "0"], 2, "radius"),
+    ("srs_opt.gait_opt", ["--radius", "1", "--turn-rate", "1"], 2, "not both"),
+    ("srs_opt.gait_opt", ["--tick", "0"], 2, "--tick"),
+    ("srs_opt.gait_opt", ["--min-dwell", "3"], 2, "--min-dwell"),
+    ("srs_opt.gait_opt", ["--warm", "{tmp}/gait.json"], 2, "missing"),
+    ("srs_opt.gait_opt", ["--robots", "{tmp}/absent.yaml"], 2, "no such file"),
+    ("srs_opt.calibrate", ["{tmp}/absent"], 2, "absent"),
+    ("srs_opt.calibrate", ["{tmp}/set"], 2, "dataset.yaml"),
+    ("srs_opt.discrepancy", ["{tmp}/absent"], 2, "absent"),
+    ("srs_opt.discrepancy", ["{tmp}/set", "--effects", "{tmp}/typo.yaml"], 2, ""),
+    ("planners.motion", ["--gaits", "{tmp}/absent.json"], 2, "no such file"),
+    ("planners.motion", ["--gaits", "{tmp}/old_table.json"], 2, "version"),
+    ("planners.generate", ["--rows", "0"], 2, ""),
+    ("planners.view", ["{tmp}/absent"], 2, "no such file"),
+    ("planners.view", ["{tmp}/motion.json"], 2, "motion.json"),
+]  # fmt: skip
+
+
+@pytest.fixture
+def files(tmp_path) -> Path:
+    for name, content in FILES.items():
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return tmp_path
+
+
+def run(command: str, arguments: list[str], folder: Path, capsys) -> tuple[int, str, str]:
+    """Run a command in this process: exit status, stdout, stderr."""
+    try:
+        module = importlib.import_module(f"{command}.__main__")
+    except ModuleNotFoundError:
+        module = importlib.import_module(command)
+    given = [a.format(tmp=folder) for a in arguments]
+    if "--out" not in given:
+        given += ["--out", str(folder / "out")]
+    main = getattr(module, "main", None)
+    try:
+        if main is not None:
+            status = main(given)
+        else:
+            from srs_opt.command import run_command
+
+            status = run_command(module.build_parser(), module.run, given)
+    except SystemExit as stop:
+        status = int(stop.code or 0)
+    captured = capsys.readouterr()
+    return status, captured.out, captured.err
+
+
+@pytest.mark.parametrize(
+    ("command", "arguments", "status", "words"),
+    CASES,
+    ids=[f"{command.split('.')[-1]} {' '.join(arguments)[:60]}" for command, arguments, _, _ in CASES],
+)
+def test_failure_is_one_line(command, arguments, status, words, files, capsys, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    found, out, err = run(command, arguments, files, capsys)
+    lines = err.strip().splitlines()
+    assert found == status, err
+    assert len(lines) == 1, err
+    assert words in lines[0]
+    assert "Traceback" not in err
+    assert not out
+    assert not list(files.rglob(".partial-*"))
+
+
+def test_failure_with_json_keeps_stdout_clean_or_one_object(files, capsys, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    _, out, err = run("srs_opt.simulate", ["--robot", "{tmp}/typo.yaml", "--json"], files, capsys)
+    assert not out or isinstance(json.loads(out), dict)
+    assert len(err.strip().splitlines()) == 1
+
+
+def commands() -> list[str]:
+    found = [
+        ".".join(path.relative_to(ROOT).parent.parts)
+        for package in ("srs_opt", "planners")
+        for path in (ROOT / package).rglob("__main__.py")
+    ]
+    return sorted([*found, "srs_opt.import_motive"])
+
+
+def test_every_command_has_failures_listed_here():
+    assert set(commands()) - {command for command, *_ in CASES} - NOT_COMMANDS == set()
+
+
+@pytest.mark.parametrize("command", commands())
+def test_help_tells_units_and_an_example(command, capsys):
+    status, out, _ = run(command, ["--help", "--out", "x"], Path(), capsys)
+    assert status == 0
+    assert "example:\n" in out
+    for option in ("--out", "--json", "--quiet", "--seed"):
+        assert option in out
+    assert re.search(r"\b(m|Hz|kPa|rad|s)\b", out)
+
+
+def test_a_bug_is_one_line_too(capsys, monkeypatch):
+    from srs_opt.command import FAULT, make_parser, run_command
+
+    def faulty(options):
+        raise RuntimeError("a\nb")
+
+    parser = make_parser("x", "y", "z")
+    assert run_command(parser, faulty, []) == FAULT
+    assert len(capsys.readouterr().err.splitlines()) == 1
+    monkeypatch.setenv("SRS_OPT_TRACEBACK", "1")
+    with pytest.raises(RuntimeError):
+        run_command(parser, faulty, [])
