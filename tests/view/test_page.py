@@ -100,8 +100,8 @@ def test_other_files_are_refused_in_one_line(driven, tmp_path, change):
 def browse(page: Path, script: str, folder: Path, fragment: str = "") -> dict:
     """Open the page in a browser, run `script` and return what it puts into `report`.
 
-    A browser without a screen may draw no frame at all while its clock is virtual: frames come from a timer of that
-    same clock, so that what the page does between frames does not depend on how busy the machine is.
+    A browser without a screen may draw no frame at all while its clock is virtual: frames come from a timer
+    of that same clock, so that what the page does between frames does not depend on the machine's load.
     """
     frames = """<script>window.requestAnimationFrame = draw => setTimeout(() => draw(performance.now()), 16);
     window.cancelAnimationFrame = clearTimeout;</script>"""
