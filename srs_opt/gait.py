@@ -113,6 +113,27 @@ class Gait:
         )
         return replace(self, intervals=flipped)
 
+    def later(self, delay_s: float) -> Gait:
+        """Return the gait with every switch later: the same motion, the cycle begun elsewhere."""
+
+        def moved(t: float) -> float:
+            late = (t + delay_s) % self.period_s
+            return 0.0 if late >= self.period_s - _COINCIDENT_S / 10 else late
+
+        rows = tuple(tuple((moved(on), moved(off)) for on, off in pairs) for pairs in self.intervals)
+        return replace(self, intervals=rows)
+
+    def wave_phase_rad(self) -> float:
+        """Return where in its cycle the body wave stands: the phase of the valves' first harmonic.
+
+        Zero when the on-intervals of all segments together are centred on the cycle's begin.
+        """
+        turn = 2j * math.pi / self.period_s
+        harmonic = sum(
+            np.exp(turn * off) - np.exp(turn * on) for pairs in self.intervals for on, off in pairs
+        )
+        return float(np.angle(harmonic / 1j))
+
     def reversed_wave(self) -> Gait:
         """Return the gait played backwards in time: the wave runs tail to head, the robot backs up."""
         period = self.period_s

@@ -123,3 +123,14 @@ def on_ticks(gait: Gait, tick_s: float, frequency_hz: tuple[float, float] | None
             row.append((start % ticks * tick_s, (start + length) % ticks * tick_s))
         rows.append(tuple(row))
     return Gait(ticks * tick_s, round(gait.pressure_kpa, 3), tuple(rows))
+
+
+def in_step(gait: Gait, tick_s: float) -> Gait:
+    """Return the gait with its cycle begun where the body wave has phase zero, on a whole tick.
+
+    Gaits are changed where cycles end. When all of a table's gaits begin at the same phase of the body
+    wave, the wave runs on through a change; otherwise the body jerks from one shape into another, and that
+    costs a fifth of a second of way each time.
+    """
+    delay = -gait.wave_phase_rad() / (2 * np.pi) * gait.period_s
+    return gait.later(round(delay / tick_s) * tick_s)

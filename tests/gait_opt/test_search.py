@@ -9,13 +9,13 @@ import pytest
 from srs_opt.errors import InputError
 from srs_opt.gait import Gait, Wave, published_wave
 from srs_opt.gait_opt.__main__ import main
-from srs_opt.gait_opt.aim import aimed, end_for_end, evened, leaned, on_ticks, within
+from srs_opt.gait_opt.aim import aimed, end_for_end, evened, in_step, leaned, on_ticks, within
 from srs_opt.gait_opt.certificate import certify, periodicity_gap, self_clearance_m
 from srs_opt.gait_opt.collocation.problem import CycleProblem
 from srs_opt.gait_opt.goal import Goal, Limits, air_work_j, chamber_volume_m3
 from srs_opt.gait_opt.report import wave_parameters
 from srs_opt.gait_opt.search import search
-from srs_opt.orbit.steady import steady_gait
+from srs_opt.orbit.steady import integrator, steady_gait
 from srs_opt.robot import wpi_srs
 from srs_opt.simulate.integrate import Integrator
 from srs_opt.simulate.timeline import Timeline
@@ -213,3 +213,29 @@ def test_bad_wishes_are_refused_in_one_line(options, word, capsys, tmp_path):
 def test_unknown_objective():
     with pytest.raises(InputError, match="objective"):
         Goal("fly")
+
+
+def test_in_step_moves_the_cycle_only():
+    gait = leaned(Wave.uniform(4, 2.0, 40.0, 0.9).gait(), 0.2).mirrored()
+    stepped = in_step(on_ticks(gait, 0.001), 0.001)
+    assert abs(stepped.wave_phase_rad()) < 2 * np.pi * 0.001 / stepped.period_s
+    assert stepped.period_s == gait.period_s
+    there, moved = steady_gait(ROBOT, on_ticks(gait, 0.001)), steady_gait(ROBOT, stepped)
+    assert moved.speed_m_s == pytest.approx(there.speed_m_s, rel=1e-3)
+    assert moved.turn_rate_rad_s == pytest.approx(there.turn_rate_rad_s, rel=1e-3)
+
+
+def test_gaits_in_step_change_without_a_jerk():
+    """From straight to a left turn: the robot keeps more of its way than when the wave begins anew."""
+    straight = in_step(Wave.uniform(4, 2.0, 45.0, 0.8).gait(), 0.001)
+    turning = in_step(Wave.uniform(4, 2.0, 45.0, 0.8, 0.4).gait(), 0.001)
+
+    def way(following):
+        timeline = Timeline.of_gait(straight, 15 * straight.period_s)
+        run = integrator(ROBOT)
+        state = run.run(timeline, run.rest()).final
+        after = run.run(Timeline.of_gait(following, 2 * following.period_s), state)
+        return np.hypot(*np.diff(after.pose[:, :2], axis=0).T).sum()
+
+    out_of_step = [way(turning.later(part * turning.period_s)) for part in (0.25, 0.75)]
+    assert way(turning) > max(out_of_step) + 0.02
