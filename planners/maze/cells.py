@@ -18,6 +18,9 @@ DIRECTIONS = ((1, 0), (0, 1), (-1, 0), (0, -1))
 def start_in_cell(inner: Box, size: RobotSize, run: Callable[[int, int], int]) -> Pose:
     """Return the start pose in a cell.
 
+    Of several openings, one with a closed wall behind is taken, then the one with the longest
+    open run, then the first of east, north, west, south. With no wall behind, the robot is centred.
+
     Parameters
     ----------
     inner : Box
@@ -25,9 +28,6 @@ def start_in_cell(inner: Box, size: RobotSize, run: Callable[[int, int], int]) -
     size : RobotSize
     run : callable
         ``run(dx, dy)``: how many cells are open in a row in that direction (0: closed).
-
-    Of several openings, one with a closed wall behind is taken, then the one with the longest
-    open run, then the first of east, north, west, south. With no wall behind, the robot is centred.
     """
 
     def merit(step: tuple[int, int]) -> tuple[bool, int]:

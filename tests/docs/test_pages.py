@@ -1,5 +1,6 @@
 """Every command and code block of README and docs runs and gives what the page shows."""
 
+import ast
 import doctest
 import os
 import subprocess
@@ -120,6 +121,21 @@ def test_docs_build_without_a_warning(tmp_path):
     )
     assert done.returncode == 0, done.stdout + done.stderr
     assert (tmp_path / "index.html").stat().st_size > 5000
-    assert not [
-        page for page in tmp_path.rglob("*.html") if "Could not collect" in page.read_text(encoding="utf-8")
-    ]
+    pages = {page: page.read_text(encoding="utf-8") for page in tmp_path.rglob("*.html")}
+    assert not [page for page, text in pages.items() if "Could not collect" in text]
+    reference = "".join(text for page, text in pages.items() if page.parent.name == "reference")
+    assert not [name for name in public_names() if f'id="{name}"' not in reference]
+
+
+def public_names() -> list[str]:
+    """Return the full name of every public function and class of the packages, commands' own apart."""
+    found = []
+    for file in (file for package in ("srs_opt", "planners") for file in (ROOT / package).rglob("*.py")):
+        if file.name == "__main__.py":
+            continue
+        module = ".".join(file.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+        body = ast.parse(file.read_text(encoding="utf-8")).body
+        defined = [x.name for x in body if isinstance(x, ast.FunctionDef | ast.ClassDef)]
+        found += [f"{module}.{name}" for name in defined if not name.startswith("_")]
+    assert len(found) > 300
+    return found
