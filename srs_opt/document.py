@@ -82,7 +82,7 @@ _Loader.add_constructor(
 
 
 def read_yaml(path: Path | str, what: str) -> Document:
-    """Read a YAML file (JSON is YAML too) into a :class:`Document`.
+    """Read a YAML file (JSON is YAML too) into a `Document`.
 
     Raises
     ------

@@ -1,8 +1,8 @@
 """The one family of exceptions that users meet.
 
 Every message says what was wrong, where, what was expected and, where it
-helps, what to try. Commands turn :class:`InputError` into exit status 2 and
-:class:`NoAnswerError` into exit status 1; anything else is a bug.
+helps, what to try. Commands turn `InputError` into exit status 2 and
+`NoAnswerError` into exit status 1; anything else is a bug.
 """
 
 from __future__ import annotations

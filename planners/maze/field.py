@@ -1,7 +1,7 @@
 """How far the nearest wall is, by table: a grid of distances with bilinear lookup and a stated error.
 
 The table answers millions of points; whatever it cannot decide within its error goes to the
-exact clearance of :class:`planners.maze.maze.Maze`.
+exact clearance of `planners.maze.maze.Maze`.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ class DistanceField:
         return np.minimum(low * (1 - dv) + high * dv, _inward(self.bounds, xy))
 
     def at_least(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Return a distance in metres that the exact one is never below: :meth:`clearance` less its error."""
+        """Return a distance in metres that the exact one is never below: `clearance` less its error."""
         return np.maximum(self.clearance(points) - self.error_m, 0.0)
 
     @classmethod

@@ -73,7 +73,7 @@ class Maze:
     def clearances(
         self, geometries: ArrayLike, limit_m: float | NDArray[np.float64] = math.inf
     ) -> NDArray[np.float64]:
-        """Return :meth:`clearance` of each of the shapely `geometries`, shape (n,); limits may differ."""
+        """Return `clearance` of each of the shapely `geometries`, shape (n,); limits may differ."""
         shapes = np.asarray(geometries, dtype=object)
         extent = np.asarray(shapely.bounds(shapes), dtype=float).reshape(-1, 4)
         inward = np.concatenate(

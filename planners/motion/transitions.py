@@ -31,7 +31,7 @@ Progress = Callable[[Iterable[int]], Iterator[int]]
 
 
 class Transitions(NamedTuple):
-    """What is simulated; arrays as in :class:`MotionTable`, and the curvatures that give the bodies.
+    """What is simulated; arrays as in `MotionTable`, and the curvatures that give the bodies.
 
     Attributes
     ----------

@@ -147,7 +147,7 @@ def bounded_solve(
     offset: np.ndarray,
     lower: np.ndarray,
 ) -> Solution:
-    """Minimise as :func:`solve` with steps not below `lower` (K,); the solution covers `chosen`."""
+    """Minimise as `solve` with steps not below `lower` (K,); the solution covers `chosen`."""
     chosen = list(chosen)
     held: dict[int, float] = {}
     free = list(chosen)

@@ -100,7 +100,7 @@ class Model:
         return p
 
     def seeds(self, values: Values, conditions: Conditions, coordinates: Sequence[Coordinate]) -> np.ndarray:
-        """Return the derivative of :meth:`pack` by `coordinates`, shape (parameters, coordinates)."""
+        """Return the derivative of `pack` by `coordinates`, shape (parameters, coordinates)."""
         p = self.pack(values, conditions)
         out = np.zeros((p.size, len(coordinates)))
         for k, coordinate in enumerate(coordinates):

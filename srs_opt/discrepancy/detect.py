@@ -95,7 +95,7 @@ def detect(
     Parameters
     ----------
     score, covariance : arrays (E,), (E, E)
-        From :func:`project`.
+        From `project`.
     groups : sequence of sequences of int
     serial : array
         Standardised autocorrelation of every trial.

@@ -47,7 +47,7 @@ class DriveCalibration:
         return speed * self.speed.value, turn_rate * self.speed.value / self.radius.value
 
     def inverse_motion(self, speed: float | np.ndarray, turn_rate: float | np.ndarray) -> tuple:  # type: ignore[type-arg]
-        """Undo :meth:`motion`."""
+        """Undo `motion`."""
         return speed / self.speed.value, turn_rate * self.radius.value / self.speed.value
 
     def deviations(self, speed: float, turn_rate: float) -> tuple[float, float]:

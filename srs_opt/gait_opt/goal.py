@@ -68,7 +68,7 @@ class Limits:
     valve_delay_s : float, optional
         Instead of the robot's own; it shifts the whole cycle and changes no steady gait.
     chamber_volume_m3 : float, optional
-        Volume that one fill takes; without, :func:`chamber_volume_m3`.
+        Volume that one fill takes; without, `chamber_volume_m3`.
     """
 
     frequency_hz: tuple[float, float] = (1.0, 2.0)

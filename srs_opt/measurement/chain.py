@@ -1,6 +1,6 @@
 """The chain's geometry in numpy, many frames at once: links' positions from pose and curvatures.
 
-Same geometry as :mod:`srs_opt.model.kinematics` (a test holds the two together), vectorised over
+Same geometry as `srs_opt.model.kinematics` (a test holds the two together), vectorised over
 frames and with its Jacobian in closed form. A configuration is ``q = (p_x, p_y, theta, kappa_1,
 ..., kappa_{N-1})``: centre of mass, mean heading, curvatures from tail to head.
 """
@@ -75,7 +75,7 @@ def link_positions(chain: Chain, q: Array) -> Array:
 
 
 def position_jacobian(chain: Chain, q: Array) -> Array:
-    """Return the derivative of :func:`link_positions`, shape (..., N, 2, N + 2)."""
+    """Return the derivative of `link_positions`, shape (..., N, 2, N + 2)."""
     n, l = chain.links, chain.segment_length_m
     theta = headings(chain, q)
     heading_slopes = _heading_slopes(chain)  # (N, N - 1): d theta_i / d kappa_j

@@ -47,7 +47,7 @@ def load_dataset(folder: Path | str) -> DataSet:
     ------
     InputError
         For the first error found, with the number of the others; see
-        :func:`srs_opt.measurement.validate.problems` for all of them.
+        `srs_opt.measurement.validate.problems` for all of them.
     """
     folder = Path(folder)
     report = Report(folder)
@@ -68,7 +68,7 @@ def load_dataset(folder: Path | str) -> DataSet:
 
 
 def write_dataset(dataset: DataSet, folder: Path | str) -> Path:
-    """Write `dataset` in the layout that :func:`load_dataset` reads; each file whole or not at all.
+    """Write `dataset` in the layout that `load_dataset` reads; each file whole or not at all.
 
     dataset.yaml comes last, so that an interrupted write does not look like a data set.
     """

@@ -1,6 +1,6 @@
 """Speed, turn rate and radius of a trial, with confidence intervals.
 
-A steady gait is fitted to all phases of the last whole cycles (:mod:`srs_opt.measurement.steady_fit`); the
+A steady gait is fitted to all phases of the last whole cycles (`srs_opt.measurement.steady_fit`); the
 transient is left out automatically; intervals come from leaving out one cycle at a time (jackknife;
 half a cycle when there are fewer than four), so that they hold whatever the correlation within a block.
 """

@@ -36,7 +36,7 @@ class ImportOptions:
     head_marker : str or None
         Label of the head's marker; without it the direction of motion tells.
     up : str
-        Direction up in Motive's axes (:func:`srs_opt.measurement.ground.ground_axes`).
+        Direction up in Motive's axes (`srs_opt.measurement.ground.ground_axes`).
     points : {"auto", "markers", "bodies"}
         Follow markers, or the pivots of rigid bodies; auto takes bodies when there is one per link.
     valve_start_s : float or None

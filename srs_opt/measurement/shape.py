@@ -2,7 +2,7 @@
 
 N + 2 unknowns stand against 2 N coordinates, yet one combination of curvatures is hard to see: bending
 neighbours in opposite directions leaves all chord directions alone and shows only in the chords' lengths,
-to second order. A weak prior on curvature keeps such frames finite; :attr:`Shape.determined` names them.
+to second order. A weak prior on curvature keeps such frames finite; `Shape.determined` names them.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ def shape_from_markers(
     ----------
     robot : Robot
     markers_m : ndarray, shape (T, N, 2)
-        Tail to head, NaN where lost (put swapped labels right first, :mod:`srs_opt.measurement.labels`).
+        Tail to head, NaN where lost (put swapped labels right first, `srs_opt.measurement.labels`).
     marker_sd_m : float
         Standard deviation of a coordinate.
     prior_sd_1_m : float, optional

@@ -22,7 +22,7 @@ def breakaway_friction(
     """Return mean, standard deviation and standard error of (16) for each direction pulled.
 
     The largest deflection is reached just before the car moves, so this is breakaway friction. For sliding
-    friction see :func:`srs_opt.measurement.tow.analyse_tow`.
+    friction see `srs_opt.measurement.tow.analyse_tow`.
 
     Raises
     ------

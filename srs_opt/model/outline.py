@@ -14,7 +14,7 @@ POINTS_PER_ARC = 6
 
 
 def points_on_centre_line(links: int) -> int:
-    """Return how many points :func:`centre_line_function` gives."""
+    """Return how many points `centre_line_function` gives."""
     return (links - 1) * (POINTS_PER_ARC + 2) + 1
 
 

@@ -49,7 +49,7 @@ def lap(run: Integrator, x: np.ndarray, mesh: Mesh, valve: np.ndarray, p: np.nda
 
 
 def plain_lap(run: Integrator, x: np.ndarray, mesh: Mesh, valve: np.ndarray, p: np.ndarray) -> Search[Lapped]:
-    """Integrate as :func:`lap` does, faster, without the derivative (not-a-number)."""
+    """Integrate as `lap` does, faster, without the derivative (not-a-number)."""
     got = yield Stretch(step_kernel(run.structure), x, mesh, valve, p)
     return Lapped(got.states, got.error_m_s, np.full((3, 3), np.nan))
 
@@ -67,7 +67,7 @@ def monodromy_step(structure: Structure) -> ca.Function:
 
 @lru_cache(maxsize=32)
 def monodromy_kernel(structure: Structure) -> Kernel:
-    """Return the compiled :func:`monodromy_step`."""
+    """Return the compiled `monodromy_step`."""
     parameters, _, actuator = build(structure)
     sizes = (BODY_STATES + actuator.states + 9, structure.segments, parameters.vector.numel())
     return Kernel(f"monodromy {structure}", sizes, lambda: monodromy_step(structure))

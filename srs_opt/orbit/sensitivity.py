@@ -78,7 +78,7 @@ def sensitivity(robot: Robot, orbit: Orbit, model: str = "complex") -> Sensitivi
     Parameters
     ----------
     orbit : Orbit
-        Of `robot` and `model`, from :func:`srs_opt.orbit.steady.steady_gait`.
+        Of `robot` and `model`, from `srs_opt.orbit.steady.steady_gait`.
     """
     run, gait = integrator(robot, model), orbit.gait
     names = run.parameters.names

@@ -103,7 +103,7 @@ def _hold_function(structure: Structure) -> ca.Function:
 def solve_orbit(
     run: Integrator, gait: Gait, tolerance: float = TOLERANCE_M_S, guess: np.ndarray | None = None
 ) -> PeriodicSolution:
-    """Return the periodic orbit of `gait`; see :func:`search_orbit`."""
+    """Return the periodic orbit of `gait`; see `search_orbit`."""
     return alone(search_orbit(run, gait, tolerance, guess))
 
 

@@ -12,7 +12,7 @@ class Buffered:
     """A function with its own argument and result arrays.
 
     Arrays are (columns, rows): a CasADi matrix of shape (rows, columns) read in C order. Write into
-    ``arguments[i]``, call :meth:`evaluate`, read ``results[i]`` (copy what must survive the next call).
+    ``arguments[i]``, call `evaluate`, read ``results[i]`` (copy what must survive the next call).
     """
 
     def __init__(self, function: ca.Function) -> None:

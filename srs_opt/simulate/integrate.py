@@ -43,7 +43,7 @@ def block_function(structure: Structure) -> ca.Function:
 
 @lru_cache(maxsize=32)
 def step_kernel(structure: Structure) -> Kernel:
-    """Return the compiled :func:`step_function`."""
+    """Return the compiled `step_function`."""
     parameters, _, actuator = build(structure)
     sizes = (BODY_STATES + actuator.states, structure.segments, parameters.vector.numel())
     return Kernel(f"step {structure}", sizes, lambda: step_function(structure))
@@ -134,7 +134,7 @@ class Integrator:
     def travel(
         self, timeline: Timeline, x: np.ndarray, tolerance: float = TOLERANCE_M_S
     ) -> Search[Trajectory]:
-        """Do what :meth:`run` does, as a search: see `together` for many at once."""
+        """Do what `run` does, as a search: see `together` for many at once."""
         timeline = timeline.delayed(valve_delay_s(self.robot))
         times, states, errors = [np.zeros(1)], [x[:, None]], []
         start = 0.0

@@ -103,7 +103,7 @@ def step_function(structure: Structure) -> ca.Function:
     """Return ``step(x, valve, h, p) -> (x_next, error)``: one RODAS step with the valves held.
 
     `x` is (state_size,), `valve` (N-1,) in [-1, 1], `h` in s (zero is allowed and does nothing), `p` as
-    packed by :class:`Parameters`. `error` is the embedded estimate of the local error of the body's
+    packed by `Parameters`. `error` is the embedded estimate of the local error of the body's
     velocity, m/s.
     """
     parameters, mechanics, actuator = build(structure)

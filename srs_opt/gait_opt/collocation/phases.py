@@ -32,7 +32,7 @@ def phase_times(switches: np.ndarray, order: np.ndarray, counts: np.ndarray) -> 
     switches : array
         Switch times as the program has them (fractions of the period, whole cycles allowed).
     order : int array
-        From :func:`switch_order`.
+        From `switch_order`.
     counts : int array
         Elements of every phase.
     """

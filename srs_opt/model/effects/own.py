@@ -30,7 +30,7 @@ def own_effects() -> dict[str, Effect]:
 
 
 def add(effect: Effect, built_in: set[str]) -> None:
-    """Keep `effect`; see :func:`srs_opt.model.effects.register_effect`."""
+    """Keep `effect`; see `srs_opt.model.effects.register_effect`."""
     name = effect.name
     if not re.fullmatch(r"[a-z][a-z0-9_]*", name):
         raise InputError(f"effect '{name}': expected a name of lower-case letters, digits and underscores")
