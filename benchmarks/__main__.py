@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 import argparse
-import datetime
 import importlib
 import json
 import os
 import pkgutil
-import platform
 import sys
 import time
-from importlib import metadata
 from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # the work is many small matrices
 
-from benchmarks.section import Section
+from benchmarks.section import Section, machine
 
 HERE = Path(__file__).parent
 REFERENCE = HERE / "reference.json"
-PACKAGES = ("srs-opt", "casadi", "numpy", "scipy", "joblib", "distributed")
 
 
 def names() -> list[str]:
@@ -48,29 +44,6 @@ def measure(chosen: list[str], quick: bool) -> tuple[dict[str, Section], list[st
         print(f"{name}: {time.perf_counter() - started:.0f} s", file=sys.stderr)
         print(sections[name].markdown(), flush=True)
     return sections, failed
-
-
-def machine() -> str:
-    """Return what the numbers were measured on."""
-    from srs_opt.simulate.compiled import compiler
-
-    model = platform.processor() or platform.machine()
-    cpuinfo = Path("/proc/cpuinfo")
-    if cpuinfo.exists():
-        model = next((line.split(":")[1].strip() for line in cpuinfo.read_text().splitlines()
-                      if line.startswith("model name")), model)  # fmt: skip
-    versions = []
-    for package in PACKAGES:
-        try:
-            versions.append(f"{package} {metadata.version(package)}")
-        except metadata.PackageNotFoundError:
-            continue
-    cc = compiler()
-    load = f", load {os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else ""
-    return (
-        f"{datetime.date.today().isoformat()}; {model}, {os.cpu_count()} cores{load}; {platform.system()}, "
-        f"Python {platform.python_version()}, {', '.join(versions)}; {cc[1] if cc else 'no C compiler'}"
-    )
 
 
 def main(argv: list[str] | None = None) -> int:

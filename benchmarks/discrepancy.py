@@ -6,25 +6,24 @@ Kinds of sets: ``null`` (nothing hidden; bench values off, noise misstated), ``t
 1.4 times its typical size, place at random), ``third`` (a third of that), ``unlisted`` (an effect in no
 list), ``triple`` (gap bending, tether weight and a segment's bias at once), ``tie`` (dead time or clock, the
 recommended instrument then added). Prints the confusion matrix and every rate with its 99 % Clopper-Pearson
-interval, beside what three simpler methods say of the same sets.
+interval, beside what three simpler methods say of the same sets. Interrupted, it goes on where it was.
 """
 
 from __future__ import annotations
 
-import argparse
-import json
-import os
 import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from benchmarks.intervals import interval, rate
+from benchmarks.section import Section
+from benchmarks.stored import gather, stored_rows, study_parser
 
 KINDS = ("null", "typical", "third", "unlisted", "triple")
 SHARES = {"null": 0.34, "typical": 0.30, "third": 0.16, "unlisted": 0.16, "triple": 0.04}
@@ -141,43 +140,51 @@ def right_class(row: Row) -> bool:
     return False
 
 
-def summarise(rows: list[Row]) -> str:
-    """Return the rates and the confusion matrix as text."""
+def rates(rows: Sequence[Row]) -> list[list[str]]:
+    """Return what is counted, hits of total, its 99 % interval, and the goal."""
     of = {kind: [r for r in rows if r["kind"] == kind] for kind in KINDS}
-    lines = []
+    lines: list[list[str]] = []
 
-    def say(what: str, hits: int, total: int, goal: str) -> None:
-        if total:
-            low, high = interval(hits, total)
-            lines.append(f"{what:58s} {rate(hits, total)}  [{low:.3f}, {high:.3f}]  goal {goal}")
+    def say(what: str, hits: Iterable[bool], goal: str = "") -> None:
+        found = list(hits)
+        if found:
+            low, high = interval(sum(found), len(found))
+            lines.append([what, rate(sum(found), len(found)).strip(), f"{low:.3f} to {high:.3f}", goal])
 
-    nulls = of["null"]
-    say("null: false alarm", sum(r["verdict"] != "no_gap" for r in nulls), len(nulls), "0.05")
-    say("null: false name", sum(r["verdict"] in ("named", "one_of") for r in nulls), len(nulls), "<= 0.02")
+    say("null: false alarm", (r["verdict"] != "no_gap" for r in of["null"]), "0.05")
+    say("null: false name", (r["verdict"] in ("named", "one_of") for r in of["null"]), "<= 0.02")
     for kind, goals in (("typical", (">= 0.90", ">= 0.95")), ("third", ("", ">= 0.75"))):
-        say(f"{kind}: right name", sum(map(right_name, of[kind])), len(of[kind]), goals[0])
-        say(f"{kind}: right class", sum(map(right_class, of[kind])), len(of[kind]), goals[1])
+        say(f"{kind}: right name", map(right_name, of[kind]), goals[0])
+        say(f"{kind}: right class", map(right_class, of[kind]), goals[1])
     named = [r for r in rows if r["verdict"] == "named" and r["kind"] in ("typical", "third", "triple")]
-    say("when named: right", sum(map(right_name, named)), len(named), ">= 0.97")
-    unlisted = of["unlisted"]
-    say("unlisted: not named", sum(r["verdict"] != "named" for r in unlisted), len(unlisted), ">= 0.85")
-    say("triple: right set", sum(map(right_name, of["triple"])), len(of["triple"]), "a set")
-    ratios = [r["ratio"] for r in named if right_name(r) and r["ratio"] is not None]
-    if ratios:
-        lines.append(f"sealed gap ratio when named right: median {np.median(ratios):.3f}, goal <= 0.15")
+    say("when named: right", map(right_name, named), ">= 0.97")
+    say("unlisted: not named", (r["verdict"] != "named" for r in of["unlisted"]), ">= 0.85")
+    say("triple: right set", map(right_name, of["triple"]), "a set")
     for method in ("nearest_shape", "forward_aic", "sparse_regression"):
-        hits = [r for r in of["typical"] if r.get("baselines", {}).get(method) == sorted(r["hidden"])]
-        say(f"baseline {method}, typical: right name", len(hits), len(of["typical"]), "")
-        wrong = [r for r in nulls if r.get("baselines", {}).get(method)]
-        say(f"baseline {method}, null: false name", len(wrong), len(nulls), "")
+        said = {kind: [r.get("baselines", {}).get(method) for r in of[kind]] for kind in ("typical", "null")}
+        right = (names == sorted(r["hidden"]) for names, r in zip(said["typical"], of["typical"]))
+        say(f"typical: right name, by {method.replace('_', ' ')}", right)
+        say(f"null: false name, by {method.replace('_', ' ')}", map(bool, said["null"]))
+    return lines
+
+
+def in_words(rows: Sequence[Row]) -> list[str]:
+    """Return what is no rate: the gap that is left, and the cost."""
+    right = [r for r in rows if r["verdict"] == "named" and right_name(r)]
+    ratios = [r["ratio"] for r in right if r["ratio"] is not None]
     times = [r["cpu_s"] for r in rows if "cpu_s" in r]
-    lines.append(f"{len(rows)} sets, processor time per set: median {np.median(times or [0]):.1f} s")
-    lines += ["", "hidden -> said:"]
+    words = [f"{len(rows)} sets, processor time per set: median {np.median(times or [0]):.1f} s."]
+    if ratios:
+        words.append(f"Sealed gap ratio when named right: median {np.median(ratios):.3f}, goal <= 0.15.")
+    return words
+
+
+def confusion(rows: Sequence[Row]) -> str:
+    """Return what was said of what, as text."""
     counts = Counter((r["kind"], "+".join(r["hidden"]) or "-", _said(r)) for r in rows)
-    lines += [
-        f"  {kind:9s} {hidden:42s} {said:60s} {n}" for (kind, hidden, said), n in sorted(counts.items())
-    ]
-    return "\n".join(lines)
+    return "\n".join(
+        f"{kind:9s} {hidden:42s} {said:60s} {n}" for (kind, hidden, said), n in sorted(counts.items())
+    )
 
 
 def _said(row: Row) -> str:
@@ -187,36 +194,26 @@ def _said(row: Row) -> str:
     return str(row["verdict"])[:58]
 
 
-def main(argv: list[str] | None = None) -> int:
-    """Run the benchmark and print its rates."""
-    from joblib import Parallel, delayed
+def run(quick: bool) -> Section:
+    """Return the rates of the stored study; two sets, measured now, where there is none or to be quick."""
+    stored = None if quick else stored_rows("discrepancy")
+    if stored is None:
+        stored = "now, two sets only", [examine(*job) for job in plan(2, 1, ("null", "typical"))]
+    measured, rows = stored
+    notes = [f"Measured {measured}.", *in_words(rows), f"```text\n{confusion(rows)}\n```"]
+    columns = ["kind of set: what is counted", "rate", "99 % interval", "goal"]
+    return Section("Discrepancy: how often it is right", columns, rates(rows), notes)
 
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--sets", type=int, default=300)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the study and print its rates."""
+    parser = study_parser("discrepancy", __doc__, 300)
     parser.add_argument("--kinds", nargs="+", choices=KINDS, default=list(KINDS))
-    parser.add_argument("--rows", type=Path, help="write every set's answer to this file, one JSON per line")
     options = parser.parse_args(argv)
-    for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-        os.environ.setdefault(variable, "1")
-    started = time.perf_counter()
-    jobs = plan(options.sets, options.seed, options.kinds)
-    rows: list[Row] = []
-    stream = options.rows.open("w") if options.rows else None
-    work = Parallel(n_jobs=options.jobs, return_as="generator_unordered")(delayed(examine)(*j) for j in jobs)
-    for row in work:
-        rows.append(row)
-        print(
-            f"{len(rows)}/{len(jobs)} {row['kind']:9s} {'+'.join(row['hidden']) or '-':30s} {_said(row)}",
-            file=sys.stderr,
-        )
-        if stream:
-            print(json.dumps(row), file=stream, flush=True)
-    print(summarise(rows))
-    print(f"{time.perf_counter() - started:.0f} s on {options.jobs} processes")
+    rows = gather("discrepancy", examine, plan(options.sets, options.seed, options.kinds), options)
+    for what, hits, span, goal in rates(rows):
+        print(f"{what:58s} {hits}  [{span}]  {goal and 'goal '}{goal}")
+    print(*in_words(rows), "", "hidden -> said:", confusion(rows), sep="\n")
     return 0
 
 

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import random
+import tempfile
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -14,6 +18,9 @@ from planners.maze.maze import Maze
 from planners.maze.micromouse import read_micromouse
 from planners.maze.places import RobotSize
 from planners.search.costmap import cost_map
+from srs_opt.calibrate.coordinates import base_coordinates
+from srs_opt.calibrate.fit import Experiment, start_point, sum_eliminated
+from srs_opt.calibrate.model import Model
 from srs_opt.gait import Wave
 from srs_opt.gait_map.grid import gait_map, grid_points
 from srs_opt.gait_opt.catalogue import shipped_table
@@ -32,6 +39,7 @@ def run(quick: bool) -> Section:
     studies = {
         "links": (_links, [3, 5] if quick else [5, 10, 20, 50]),
         "simulated trials": (_trials, [4, 16] if quick else [10, 30, 100, 300, 1000]),
+        "fitted trials": (_fitted, [4, 12] if quick else [10, 30, 100, 300, 1000]),
         "map points": (_points, [16, 64] if quick else [10, 30, 100, 300, 1000]),
         "maze area": (_area, [4, 8] if quick else [8, 16, 32, 64]),
     }
@@ -79,6 +87,28 @@ def _trials(sizes: list[int]) -> dict[str, Curve]:
         for size in sizes
     ]
     return {"2 s of motion each": ([float(s) for s in sizes], costs)}
+
+
+def _fitted(sizes: list[int]) -> dict[str, Curve]:
+    """One step of a calibration; trials of a generated set, over and over under new names."""
+    from benchmarks.discrepancy import generate
+    from srs_opt.measurement.dataset import load_dataset
+
+    with tempfile.TemporaryDirectory() as scratch:
+        generate(Path(scratch) / "set", "null", (), 1)
+        dataset = load_dataset(Path(scratch) / "set")
+    base = base_coordinates(dataset.robot)
+    point, model = start_point(base), Model(dataset.robot)
+    costs = []
+    for size in sizes:
+        trials = [replace(t, name=f"t{k}") for k, t in zip(range(size), itertools.cycle(dataset.trials))]
+        costs.append(
+            best_time(  # a new experiment each time: nothing is known of its trials
+                lambda: sum_eliminated(Experiment(model, trials, 0.001).grams(point, base)),  # noqa: B023
+                2 if size <= 100 else 1,
+            )
+        )
+    return {"a step of calibration": ([float(s) for s in sizes], costs)}
 
 
 def _points(sizes: list[int]) -> dict[str, Curve]:

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import datetime
+import os
+import platform
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from importlib import metadata
 from pathlib import Path
 
 import numpy as np
 
 PICTURES = Path(__file__).parent / "pictures"
+PACKAGES = ("srs-opt", "casadi", "numpy", "scipy", "joblib", "distributed")
 
 
 @dataclass(frozen=True)
@@ -77,3 +82,26 @@ def growth_picture(name: str, x: str, curves: dict[str, tuple[Sequence[float], S
     axes.legend()
     png, _ = save_figure(figure, PICTURES / name)
     return png
+
+
+def machine() -> str:
+    """Return what the numbers were measured on."""
+    from srs_opt.simulate.compiled import compiler
+
+    model = platform.processor() or platform.machine()
+    cpuinfo = Path("/proc/cpuinfo")
+    if cpuinfo.exists():
+        model = next((line.split(":")[1].strip() for line in cpuinfo.read_text().splitlines()
+                      if line.startswith("model name")), model)  # fmt: skip
+    versions = []
+    for package in PACKAGES:
+        try:
+            versions.append(f"{package} {metadata.version(package)}")
+        except metadata.PackageNotFoundError:
+            continue
+    cc = compiler()
+    load = f", load {os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else ""
+    return (
+        f"{datetime.date.today().isoformat()}; {model}, {os.cpu_count()} cores{load}; {platform.system()}, "
+        f"Python {platform.python_version()}, {', '.join(versions)}; {cc[1] if cc else 'no C compiler'}"
+    )

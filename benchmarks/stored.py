@@ -1,0 +1,65 @@
+"""Long statistics: swept over many sets, kept as rows in a file that says when and where they were found."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shutil
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from benchmarks.section import machine
+from srs_opt.command import positive_int
+from srs_opt.files import write_text
+from srs_opt.sweep import Resume, sweep
+
+STORED = Path(__file__).parent / "stored"
+Row = Any  # what JSON holds
+
+
+def study_parser(name: str, description: str | None, sets: int) -> argparse.ArgumentParser:
+    """Return a parser with the options of all long studies."""
+    parser = argparse.ArgumentParser(
+        prog=f"python -m benchmarks.{name}",
+        description=description,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    add = parser.add_argument
+    add("--sets", type=positive_int, default=sets, help=f"how many sets (default {sets})")
+    add("--seed", type=int, default=1)
+    add("--jobs", type=positive_int, default=os.cpu_count() or 1, help="processes (default: all cores)")
+    add("--cluster", metavar="ADDRESS", help="Dask scheduler to send the work to, host:port")
+    add("--rows", type=Path, default=STORED / f"{name}.jsonl", metavar="FILE",
+        help="the rows, one JSON each; the default is what the report shows")  # fmt: skip
+    return parser
+
+
+def gather(
+    name: str, work: Callable[..., Row], items: Sequence[tuple[Any, ...]], options: argparse.Namespace
+) -> list[Row]:
+    """Return ``work(*item)`` of all items and keep the rows; when interrupted, the next call goes on."""
+    unfinished = options.rows.with_suffix(".unfinished")
+    rows = list(
+        sweep(partial(_each, work), items, chunk=1, jobs=options.jobs, cluster=options.cluster, what=name,
+              quiet=False, resume=Resume(unfinished, name))
+    )  # fmt: skip
+    lines = [{"measured": machine(), "seed": options.seed}, *rows]
+    write_text(options.rows, "".join(json.dumps(line) + "\n" for line in lines))
+    shutil.rmtree(unfinished, ignore_errors=True)
+    return rows
+
+
+def _each(work: Callable[..., Row], items: Sequence[tuple[Any, ...]]) -> list[Row]:
+    return [work(*item) for item in items]
+
+
+def stored_rows(name: str) -> tuple[str, list[Row]] | None:
+    """Return when and where a study was last made, and its rows; None if it never was."""
+    path = STORED / f"{name}.jsonl"
+    if not path.exists():
+        return None
+    first, *rows = map(json.loads, path.read_text(encoding="utf-8").splitlines())
+    return str(first["measured"]), rows
