@@ -41,7 +41,7 @@ def run(quick: bool) -> Section:
         "simulated trials": (_trials, [4, 16] if quick else [10, 30, 100, 300, 1000]),
         "fitted trials": (_fitted, [4, 12] if quick else [10, 30, 100, 300, 1000]),
         "map points": (_points, [16, 64] if quick else [10, 30, 100, 300, 1000]),
-        "maze area": (_area, [4, 8] if quick else [8, 16, 32, 64]),
+        "maze area (m²)": (_area, [4, 8] if quick else [8, 16, 32, 64]),
     }
     rows, pictures, ratios = [], [], {}
     for name, (study, sizes) in studies.items():
@@ -52,7 +52,7 @@ def run(quick: bool) -> Section:
             if not quick and "compiling" not in label:
                 ratios[f"{name}, {label}, exponent"] = exponent(n, cost)
         if not quick:
-            pictures.append(growth_picture(f"growth_{name.replace(' ', '_')}", name, curves))
+            pictures.append(growth_picture("growth_" + "_".join(name.split()[:2]), name, curves))
     notes = ["Costs in s. Compiling happens once per structure and machine; code is kept."]
     return Section("Growth", ["what grows", "cost of", "s", "exponent"], rows, notes, ratios, pictures)
 

@@ -10,8 +10,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from importlib import metadata
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+from srs_opt.figures import COLOURS, new_figure, styled
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 PICTURES = Path(__file__).parent / "pictures"
 PACKAGES = ("srs-opt", "casadi", "numpy", "scipy", "joblib", "distributed")
@@ -72,16 +78,26 @@ def exponent(sizes: Sequence[float], costs: Sequence[float]) -> float:
 
 def growth_picture(name: str, x: str, curves: dict[str, tuple[Sequence[float], Sequence[float]]]) -> Path:
     """Draw costs over sizes, both logarithmic, with their exponents in the legend; return the PNG."""
-    from srs_opt.figures import new_figure, save_figure
+    from srs_opt.figures import save_figure
+
+    png, _ = save_figure(_growth_figure(x, curves), PICTURES / name)
+    return png
+
+
+@styled
+def _growth_figure(x: str, curves: dict[str, tuple[Sequence[float], Sequence[float]]]) -> Figure:
+    from matplotlib.ticker import FixedLocator, NullLocator
 
     figure, axes = new_figure()
-    for label, (sizes, costs) in curves.items():
-        axes.loglog(sizes, costs, "o-", markersize=3, label=f"{label}: exponent {exponent(sizes, costs):.2f}")
-    axes.set_xlabel(x)
-    axes.set_ylabel("cost (s)")
-    axes.legend()
-    png, _ = save_figure(figure, PICTURES / name)
-    return png
+    for marker, colour, (label, (sizes, costs)) in zip("os^d", COLOURS, curves.items()):
+        told = f"{label}: exponent {exponent(sizes, costs):.2f}"
+        axes.loglog(sizes, costs, marker=marker, markersize=3, color=colour, label=told)
+    every = sorted({size for sizes, _ in curves.values() for size in sizes})
+    axes.xaxis.set(major_locator=FixedLocator(every), minor_locator=NullLocator())
+    axes.set_xticklabels([f"{size:.3g}" for size in every])
+    axes.set(xlabel=x, ylabel="cost (s)")
+    figure.legend(loc="outside upper left")
+    return figure
 
 
 def machine() -> str:
