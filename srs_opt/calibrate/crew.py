@@ -38,7 +38,8 @@ class Crew:
         for share in shares[1:]:
             if share:
                 here, there = context.Pipe()
-                setup = (experiment.model.robot, experiment.model.full.model, share, experiment.sd_m)
+                noise = (experiment.sd_m, experiment.tolerance_m_s)
+                setup = (experiment.model.robot, experiment.model.full.model, share, *noise)
                 process = context.Process(target=_serve, args=(there, *setup), daemon=True)
                 with workers_deaf_to_interrupts():
                     process.start()
@@ -80,9 +81,8 @@ class Crew:
         found: dict[str, TrialGram] = {}
         failure: NoAnswerError | None = None
         try:
-            for t in trials:
-                if t.name in self.own:
-                    found[t.name] = self.experiment.gram(t, point, coordinates, extra)
+            own = [t for t in trials if t.name in self.own]
+            found.update(self.experiment.own_grams(own, point, coordinates, extra))
         except NoAnswerError as error:
             failure = error
         for connection in asked:
@@ -96,12 +96,14 @@ class Crew:
         return {t.name: found[t.name] for t in trials}
 
 
-def _serve(connection: Connection, robot: Any, model: str, trials: list[Trial], sd_m: float) -> None:
+def _serve(
+    connection: Connection, robot: Any, model: str, trials: list[Trial], sd_m: float, tolerance_m_s: float
+) -> None:
     """Answer requests until told to stop."""
     from srs_opt.calibrate.fit import Experiment
     from srs_opt.calibrate.model import Model
 
-    experiment = Experiment(Model(robot, model), trials, sd_m)
+    experiment = Experiment(Model(robot, model), trials, sd_m, tolerance_m_s=tolerance_m_s)
     known = {t.name: t for t in trials}
     while True:
         try:
@@ -112,6 +114,6 @@ def _serve(connection: Connection, robot: Any, model: str, trials: list[Trial], 
             return
         names, point, coordinates, extra = request
         try:
-            connection.send({n: experiment.gram(known[n], point, coordinates, extra) for n in names})
+            connection.send(experiment.own_grams([known[n] for n in names], point, coordinates, extra))
         except NoAnswerError as error:
             connection.send(str(error))

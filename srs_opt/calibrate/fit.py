@@ -14,10 +14,11 @@ from srs_opt.calibrate.gram import Solution, TrialGram, bounded_solve, trial_gra
 from srs_opt.calibrate.instruments import NAME, reading_gram, readings
 from srs_opt.calibrate.model import Model
 from srs_opt.calibrate.noise import track_of
-from srs_opt.calibrate.nominal import TOLERANCE_M_S, TrialRun
+from srs_opt.calibrate.nominal import Nodes, TrialRun, tolerance_for
 from srs_opt.calibrate.observe import Prediction, predict
 from srs_opt.errors import NoAnswerError
 from srs_opt.measurement.records import Bench, Trial
+from srs_opt.simulate.together import together
 
 if TYPE_CHECKING:
     from srs_opt.calibrate.crew import Crew
@@ -64,15 +65,26 @@ class Experiment:
     trials : sequence of Trial
     sd_m : float
         Noise per coordinate.
+    bench : Bench, optional
+        Readings of other instruments to hold the model against too.
+    tolerance_m_s : float, optional
+        Of the simulation; default: what the trials' number of values asks for.
     """
 
     def __init__(
-        self, model: Model, trials: Sequence[Trial], sd_m: float, bench: Bench | None = None
+        self,
+        model: Model,
+        trials: Sequence[Trial],
+        sd_m: float,
+        bench: Bench | None = None,
+        tolerance_m_s: float | None = None,
     ) -> None:
         self.model, self.trials, self.sd_m = model, tuple(trials), sd_m
         self.readings = readings(model, bench) if bench is not None else ()
         self.runs = {t.name: TrialRun(model, t) for t in self.trials}
         self.tracks = {t.name: track_of(t) for t in self.trials}
+        count = sum(track.size for track in self.tracks.values() if track is not None)
+        self.tolerance_m_s = tolerance_m_s or tolerance_for(count, sd_m)
         self.scatter_sd = np.array(list(SCATTER_SD.values()))
         self.crew: Crew | None = None
 
@@ -81,11 +93,16 @@ class Experiment:
         trial: Trial,
         point: Point,
         coordinates: Sequence[Coordinate] = (),
-        tolerance_m_s: float = TOLERANCE_M_S,
+        tolerance_m_s: float | None = None,
     ) -> Prediction:
         """Return the prediction of one trial at `point`."""
+        nodes = self.runs[trial.name](point.of_trial(trial.name), tolerance_m_s or self.tolerance_m_s)
+        return self._seen(trial, nodes, point, coordinates)
+
+    def _seen(
+        self, trial: Trial, nodes: Nodes, point: Point, coordinates: Sequence[Coordinate]
+    ) -> Prediction:
         values = point.of_trial(trial.name)
-        nodes = self.runs[trial.name](values, tolerance_m_s)
         centre_only = trial.markers_m is None
         return predict(self.model, trial, nodes, values, coordinates, centre_only=centre_only)
 
@@ -106,7 +123,35 @@ class Experiment:
 
         The coordinates must include the scattering parameters.
         """
-        prediction = self.predict(trial, point, coordinates)
+        return self.own_grams((trial,), point, coordinates, extra)[trial.name]
+
+    def own_grams(
+        self,
+        trials: Sequence[Trial],
+        point: Point,
+        coordinates: Sequence[Coordinate],
+        extra: Extra | None = None,
+    ) -> dict[str, TrialGram]:
+        """Return the Gram matrices of `trials`, simulated side by side in this process."""
+        nodes = together(
+            [self.runs[t.name].search(point.of_trial(t.name), self.tolerance_m_s) for t in trials]
+        )
+        found = {}
+        for trial, run in zip(trials, nodes):
+            if isinstance(run, NoAnswerError):
+                raise run
+            found[trial.name] = self._gram(trial, run, point, coordinates, extra)
+        return found
+
+    def _gram(
+        self,
+        trial: Trial,
+        nodes: Nodes,
+        point: Point,
+        coordinates: Sequence[Coordinate],
+        extra: Extra | None,
+    ) -> TrialGram:
+        prediction = self._seen(trial, nodes, point, coordinates)
         residual = self.residual(trial, prediction)
         slopes = prediction.slopes.reshape(residual.size, -1)
         if extra is not None:
@@ -129,7 +174,7 @@ class Experiment:
         if self.crew is not None:
             found = self.crew.grams(chosen, point, coordinates, extra)
         else:
-            found = {t.name: self.gram(t, point, coordinates, extra) for t in chosen}
+            found = self.own_grams(chosen, point, coordinates, extra)
         if self.readings and found:
             further = next(iter(found.values())).raw.shape[0] - 1 - len(coordinates)
             found[NAME] = reading_gram(self.readings, point.values, coordinates, further)
@@ -167,6 +212,8 @@ class Fit:
         Trial name -> TrialGram at the point.
     iterations : int
     converged : bool
+    start_misfit_ratio : float
+        As `misfit_ratio`, where the fit began.
     """
 
     coordinates: tuple[Coordinate, ...]
@@ -178,6 +225,7 @@ class Fit:
     grams: dict[str, TrialGram]
     iterations: int
     converged: bool
+    start_misfit_ratio: float = math.nan
 
     @property
     def sd(self) -> dict[str, float]:
@@ -197,14 +245,18 @@ def priors(coordinates: Sequence[Coordinate], point: Point) -> tuple[np.ndarray,
     return precision, offset
 
 
+def misfit_ratio(grams: Mapping[str, TrialGram]) -> float:
+    """Return the sum of squared residuals over its expectation under noise alone."""
+    return sum(g.misfit for g in grams.values()) / sum(g.count for g in grams.values())
+
+
 def temper_of(grams: Mapping[str, TrialGram]) -> float:
     """Return the factor on the noise variance that a misfit calls for.
 
     What a wrong model leaves behind is smooth in time and alike over the markers, so that CORRELATED values
     count as one; without this, thousands of frames would pull the parameters far from their bench values.
     """
-    count = sum(g.count for g in grams.values())
-    ratio = sum(g.misfit for g in grams.values()) / count
+    count, ratio = sum(g.count for g in grams.values()), misfit_ratio(grams)
     return 1 + CORRELATED * max(0.0, ratio - 1 - 4 * math.sqrt(2 / count))
 
 
@@ -240,6 +292,7 @@ def fit(
         kept = {n: v for n, v in start.values.items() if n in names}
         point = Point({**point.values, **kept}, dict(start.scatter))
     grams = experiment.grams(point, coordinates, trials)
+    at_start = misfit_ratio(grams)
     done, converged, damping, behind = 0, False, 0.0, math.inf
     while done < iterations and not converged:
         done += 1
@@ -275,11 +328,12 @@ def fit(
         point,
         _step(coordinates, grams, point, temper, 0.0).covariance,
         objective(coordinates, grams, point, 1.0),
-        sum(g.misfit for g in grams.values()) / sum(g.count for g in grams.values()),
+        misfit_ratio(grams),
         temper,
         grams,
         done,
         converged,
+        at_start,
     )
 
 

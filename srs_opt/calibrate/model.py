@@ -74,9 +74,15 @@ class Model:
             np.array([self._index[n] for n in _layout(structure)]) for structure in self.structures
         )
 
-    def structure(self, values: Values) -> tuple[Structure, np.ndarray]:
-        """Return the smallest structure that holds the effects of `values`, and where its parameters are."""
+    def structure(
+        self, values: Values, coordinates: Sequence[Coordinate] = ()
+    ) -> tuple[Structure, np.ndarray]:
+        """Return the smallest structure with the effects of `values`, and where its parameters are.
+
+        Effects that only `coordinates` name, for derivatives at zero, are in it too.
+        """
         present = {name.split(".")[0] for name, v in values.items() if "." in name and v != 0}
+        present |= {c.effect for c in coordinates}
         present |= {"single_wheel_toe"} if "wheel_toe" in present else set()
         present |= {"segment_bias"} if "curvature_bias" in present else set()
         level = 2 if present & set(_NONLINEAR) else 1 if present & set(_MECHANICAL) else 0

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import casadi as ca
 import numpy as np
 
 from srs_opt.calibrate.model import Conditions, Model, Values
@@ -13,16 +12,18 @@ from srs_opt.calibrate.start import start_pose
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait, Wave
 from srs_opt.measurement.records import Schedule, Trial
-from srs_opt.simulate.buffered import buffered
-from srs_opt.simulate.integrate import BLOCK, block_function
+from srs_opt.simulate.integrate import step_kernel
+from srs_opt.simulate.kernel import Kernel
 from srs_opt.simulate.mesh import Mesh
 from srs_opt.simulate.rosenbrock import BODY_STATES
 from srs_opt.simulate.timeline import Timeline
+from srs_opt.simulate.together import Search, Stretch, Stretched, alone
 
 STEP_S = 0.005
 # local error of the body's speed per step; 5e-6 keeps the track within about 0.01 mm, well below what a
-# few thousand frames of 1 mm markers can see
+# thousand frames of 1 mm markers can see
 TOLERANCE_M_S = 5e-6
+FINEST_M_S = 2e-7
 ACCEPTED = 15.0  # single steps may be worse: friction forgets an error of speed within milliseconds
 ATTEMPTS = 4
 _TAIL_S = 0.05  # simulated beyond the last label, for clocks that run late
@@ -52,6 +53,15 @@ class Nodes:
     memory: np.ndarray
     valve: np.ndarray
     p: np.ndarray
+
+
+def tolerance_for(values: int, sd_m: float) -> float:
+    """Return the tolerance whose errors that many measured values with noise `sd_m` cannot see.
+
+    An error of the track counts as its square, over the noise's, times the number of values.
+    """
+    needed = TOLERANCE_M_S * (sd_m / 0.001) * math.sqrt(15_000 / max(values, 1))
+    return min(TOLERANCE_M_S, max(FINEST_M_S, needed))
 
 
 def timeline_of(trial: Trial, segments: int) -> Timeline:
@@ -104,15 +114,19 @@ class TrialRun:
         NoAnswerError
             If the motion stops being finite.
         """
+        return alone(self.search(values, tolerance_m_s))
+
+    def search(self, values: Values, tolerance_m_s: float = TOLERANCE_M_S) -> Search[Nodes]:
+        """Do what a call does, as a search: see `simulate.together` for many trials at once."""
         structure, kept = self.model.structure(values)
         p = self.model.pack(values, self.conditions)
         delay = values.get("dead_time.delay_s", 0.0) + self.model.robot.valve_delay_s
         timeline = self.timeline.delayed(delay)
         x = self._start(p, structure.segments, nonlinear=structure == self.model.full)
         states, valves, steps = [x[:, None]], [], []
-        block = block_function(structure)
+        kernel = step_kernel(structure)
         for number, piece in enumerate(_cycles(timeline, self.trial.period_s)):
-            new, mesh = self._piece((tolerance_m_s, number), block, x, piece, p[kept])
+            new, mesh = yield from self._piece((tolerance_m_s, number), kernel, x, piece, p[kept])
             x = new[:, -1]
             states.append(new)
             valves.append(piece.valve[:, mesh.phase])
@@ -127,20 +141,21 @@ class TrialRun:
         return x
 
     def _piece(
-        self, key: tuple[float, int], block: ca.Function, x: np.ndarray, piece: Timeline, p: np.ndarray
-    ) -> tuple[np.ndarray, Mesh]:
+        self, key: tuple[float, int], kernel: Kernel, x: np.ndarray, piece: Timeline, p: np.ndarray
+    ) -> Search[tuple[np.ndarray, Mesh]]:
         """Integrate one cycle on the mesh that served it last time, refined where that is too coarse."""
         phases = (*np.round(piece.duration_s, 7), *piece.valve.ravel())
         tolerance, number = key
         kept = self._meshes.get(key) or self._meshes.get((tolerance, number - 1))
         mesh = _fitted(kept, piece.duration_s, phases) or Mesh.uniform(piece.duration_s, STEP_S)
         for attempt in range(ATTEMPTS):
-            states, errors = _steps(block, x, mesh, piece.valve, p)
-            if errors.max() <= ACCEPTED * tolerance or attempt == ATTEMPTS - 1:
+            got = yield Stretch(kernel, x, mesh, piece.valve, p)
+            _check(got)
+            if got.error_m_s.max() <= ACCEPTED * tolerance or attempt == ATTEMPTS - 1:
                 break
-            mesh = mesh.refined(errors, tolerance)
+            mesh = mesh.refined(got.error_m_s, tolerance)
         self._meshes[key] = (phases, mesh)
-        return states, mesh
+        return got.states, mesh
 
 
 def _fitted(
@@ -157,26 +172,9 @@ def _fitted(
     return Mesh(mesh.h_s * stretch[mesh.phase], mesh.phase)
 
 
-def _steps(
-    block: ca.Function, x: np.ndarray, mesh: Mesh, valve: np.ndarray, p: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    call = buffered(block)
-    state, valves, h, parameters = call.arguments
-    state[0], parameters[0] = x, p
-    n = mesh.h_s.size
-    held = valve.T[mesh.phase]
-    states, errors = np.empty((n, x.size)), np.empty(n)
-    for k in range(0, n, BLOCK):
-        count = min(BLOCK, n - k)
-        valves[:count], h[:count, 0], h[count:] = held[k : k + count], mesh.h_s[k : k + count], 0.0
-        call.evaluate()
-        new, error = call.results
-        states[k : k + count], errors[k : k + count] = new[:count], error[:count, 0]
-        state[0] = new[count - 1]
-    result = states.T
-    if not np.isfinite(result[:, -1]).all():
+def _check(got: Stretched) -> None:
+    if not np.isfinite(got.states[:, -1]).all():
         raise NoAnswerError("the simulated motion of a trial stops being finite; effect sizes out of range")
-    return result, errors
 
 
 def _cycles(timeline: Timeline, period_s: float) -> list[Timeline]:

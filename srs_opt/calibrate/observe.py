@@ -118,22 +118,23 @@ def predict(
     """
     at = trial.time_s + values.get("clock_offset.offset_s", 0.0)
     camera = np.array([values.get(name, 0.0) for name in CAMERA])
-    rate = _pose_rate(model, nodes)
+    rate = _pose_rate(model, nodes, values)
     pose = _hermite(nodes.time_s, nodes.body[:, :3], rate, at)
     kappa = _hermite(nodes.time_s, nodes.kappa, nodes.dkappa, at)
-    function = _picture(model.full, centre_only)
-    points, by_pose, by_kappa, by_camera, by_p = evaluate(function, (pose, kappa), camera, nodes.p)
+    structure, kept = model.structure(values, coordinates)
+    function = _picture(structure, centre_only)
+    points, by_pose, by_kappa, by_camera, by_p = evaluate(function, (pose, kappa), camera, nodes.p[kept])
     frames, seen = points.shape
     slopes = np.zeros((frames, seen, len(coordinates)))
     if not coordinates:
         return Prediction(points, slopes, pose, kappa)
-    seeds = model.seeds(values, _conditions(trial), coordinates)
+    seeds = model.seeds(values, _conditions(trial), coordinates)[kept]
     width = float(np.exp(values.get("hysteresis.log_width", np.log(4.0))))
     moving = np.flatnonzero(np.any(seeds != 0, axis=0))
     jac_pose = by_pose.reshape(frames, 3, seen).transpose(0, 2, 1)
     jac_kappa = by_kappa.reshape(frames, -1, seen).transpose(0, 2, 1)
     if moving.size:
-        varied = variation(model.full, nodes, seeds[:, moving], trial.heading_rad, width)
+        varied = variation(structure, nodes, nodes.p[kept], seeds[:, moving], trial.heading_rad, width)
         part = jac_pose @ _linear(nodes.time_s, varied.pose, at)
         part += jac_kappa @ _linear(nodes.time_s, varied.kappa, at)
         jac_p = by_p.reshape(frames, -1, seen).transpose(0, 2, 1)
@@ -171,9 +172,10 @@ def _pose_rate_function(structure: Structure) -> ca.Function:
     return compiled(f"pose rate {structure}", make)
 
 
-def _pose_rate(model: Model, nodes: Nodes) -> np.ndarray:
-    function = _pose_rate_function(model.full)
-    return evaluate(function, (nodes.body, nodes.kappa, nodes.dkappa), nodes.p)[0]
+def _pose_rate(model: Model, nodes: Nodes, values: Values) -> np.ndarray:
+    structure, kept = model.structure(values)
+    function = _pose_rate_function(structure)
+    return evaluate(function, (nodes.body, nodes.kappa, nodes.dkappa), nodes.p[kept])[0]
 
 
 def _velocity(nodes: Nodes, rate: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

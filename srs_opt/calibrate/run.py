@@ -45,9 +45,7 @@ def calibrate(
         return fit_maps(dataset, model)
     base = base_coordinates(dataset.robot)
     experiment = Experiment(Model(dataset.robot, model), trials, noise_sd_m(dataset), dataset.bench)
-    start = start_point(base)
     with Crew(experiment, jobs) if jobs > 1 else nullcontext():
-        grams = experiment.grams(start, base).values()
-        found = fit(experiment, base, start, report=tell)
-    before = math.sqrt(sum(g.misfit for g in grams) / sum(g.count for g in grams))
-    return calibration(dataset.robot, found, before, math.sqrt(found.misfit_ratio))
+        found = fit(experiment, base, start_point(base), report=tell)
+    before, after = math.sqrt(found.start_misfit_ratio), math.sqrt(found.misfit_ratio)
+    return calibration(dataset.robot, found, before, after)

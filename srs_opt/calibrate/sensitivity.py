@@ -7,6 +7,7 @@ need none of this: they shift the motion in time, so their derivative is minus t
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 
 import casadi as ca
@@ -43,23 +44,25 @@ def _body_slopes(structure: Structure) -> ca.Function:
 
 @lru_cache(maxsize=8)
 def _actuator_slopes(structure: Structure) -> ca.Function:
-    """Return ``(kappa, dkappa, z, valve, p) -> (rates of dkappa, z by kappa, dkappa, z; by p)``, mapped."""
+    """Return ``(states, valve, p) -> (rates of dkappa, z by the states; by p)``, mapped.
+
+    States are kappa, dkappa and, where hysteresis can act, z.
+    """
 
     def make() -> ca.Function:
         from srs_opt.model.actuator import ActuatorState
 
         parameters, _, actuator = build(structure)
         n = structure.segments
-        kappa, dkappa, z, valve = (ca.SX.sym(s, n) for s in ("kappa", "dkappa", "z", "valve"))
-        rates = actuator.rates(ActuatorState(kappa, dkappa, (z,)), valve)
-        field = ca.vertcat(rates.dkappa, rates.memory[0])
-        own = [
-            ca.horzcat(*[_diagonal(rate, v) for v in (kappa, dkappa, z)]) for rate in ca.vertsplit(field, n)
-        ]
+        states = [ca.SX.sym(f"state{k}", n) for k in range(2 + actuator.memories)]
+        valve = ca.SX.sym("valve", n)
+        rates = actuator.rates(ActuatorState(states[0], states[1], tuple(states[2:])), valve)
+        field = ca.vertcat(rates.dkappa, *rates.memory)
+        own = [ca.horzcat(*[_diagonal(rate, v) for v in states]) for rate in ca.vertsplit(field, n)]
         by_p = ca.densify(ca.jacobian(field, parameters.vector))
         outputs = [ca.reshape(o, -1, 1) for o in (ca.vertcat(*own), by_p)]
-        single = ca.Function("act", [kappa, dkappa, z, valve, parameters.vector], outputs, {"cse": True})
-        return mapped(single, (4,))
+        single = ca.Function("act", [*states, valve, parameters.vector], outputs, {"cse": True})
+        return mapped(single, (len(states) + 1,))
 
     return compiled(f"actuator slopes {MAP} {structure}", make)
 
@@ -123,15 +126,33 @@ def _forcing(a: np.ndarray, h: np.ndarray, b0: np.ndarray, b1: np.ndarray) -> np
 
 
 def _solve(decay: np.ndarray, forcing: np.ndarray, start: np.ndarray) -> np.ndarray:
-    """Run the recurrence S <- decay (S + forcing) over axis 0; return S at all nodes."""
-    out = np.empty((decay.shape[0] + 1, *start.shape))
-    out[0] = start
-    for k in range(decay.shape[0]):
-        out[k + 1] = decay[k] @ (out[k] + forcing[k])
-    return out
+    """Run the recurrence S <- decay (S + forcing) over axis 0; return S at all nodes.
+
+    Cut into about sqrt(n) runs that advance side by side from zero, with what the run's start becomes; then
+    the runs are chained.
+    """
+    n = decay.shape[0]
+    length = max(1, math.isqrt(n))
+    runs = -(-n // length)
+    padding = ((0, runs * length - n), *[(0, 0)] * (decay.ndim - 1))
+    steps = np.pad(decay, padding).reshape(runs, length, *decay.shape[1:])
+    added = np.pad(decay @ forcing, padding).reshape(runs, length, *forcing.shape[1:])
+    carried = np.empty_like(steps)
+    carried[:, 0] = steps[:, 0]
+    for k in range(1, length):
+        np.matmul(steps[:, k], carried[:, k - 1], out=carried[:, k])
+        added[:, k] += steps[:, k] @ added[:, k - 1]
+    starts = np.empty((runs, *start.shape))
+    starts[0] = start
+    for k in range(1, runs):
+        starts[k] = carried[k - 1, -1] @ starts[k - 1] + added[k - 1, -1]
+    added += carried @ starts[:, None]
+    return np.concatenate([start[None], added.reshape(-1, *start.shape)[:n]])
 
 
-def shape_variation(structure: Structure, nodes: Nodes, seeds: np.ndarray, width: float) -> np.ndarray:
+def shape_variation(
+    structure: Structure, nodes: Nodes, p: np.ndarray, seeds: np.ndarray, width: float
+) -> np.ndarray:
     """Return d(kappa, dkappa)/d coordinates at the nodes, shape (nodes, 2 (N-1), K)."""
     n, columns = structure.segments, seeds.shape[1]
     acting = _acting(structure, seeds)
@@ -139,33 +160,36 @@ def shape_variation(structure: Structure, nodes: Nodes, seeds: np.ndarray, width
     if not acting.any():
         return out
     function = _actuator_slopes(structure)
-    hysteresis = [i for i, name in enumerate(build(structure)[0].names) if "hysteresis" in name]
-    z = with_memory(nodes, width) if seeds[hysteresis].any() else _no_memory(nodes)
+    states = 2 + build(structure)[2].memories
+    moving: tuple[np.ndarray, ...] = (nodes.kappa, nodes.dkappa)
+    if states > 2:
+        hysteresis = ["hysteresis" in name for name in build(structure)[0].names]
+        moving += (with_memory(nodes, width) if seeds[hysteresis].any() else _no_memory(nodes),)
     # at a switch the rates jump: a node then counts twice, under the valves before and after it
     switched = np.append(np.any(np.diff(nodes.valve, axis=0) != 0, axis=1), True)
     ends = np.flatnonzero(switched) + 1
     row = np.concatenate([np.arange(switched.size), ends])
     valve = np.concatenate([nodes.valve, nodes.valve[ends - 1]])
-    own, by_p = evaluate(function, (nodes.kappa[row], nodes.dkappa[row], z[row], valve), nodes.p)
-    own = own.reshape(-1, 3, 2, n).transpose(0, 3, 2, 1)  # (rows, segment, (ddk, dz), state)
-    forced = by_p.reshape(-1, seeds.shape[0], 2 * n).transpose(0, 2, 1) @ seeds[:, acting]
-    forced = forced.reshape(-1, 2, n, int(acting.sum())).transpose(0, 2, 1, 3)
+    own, by_p = evaluate(function, (*(v[row] for v in moving), valve), p)
+    own = own.reshape(-1, states, states - 1, n).transpose(0, 3, 2, 1)  # (rows, segment, (ddk, dz), state)
+    forced = by_p.reshape(-1, seeds.shape[0], (states - 1) * n).transpose(0, 2, 1) @ seeds[:, acting]
+    forced = forced.reshape(-1, states - 1, n, int(acting.sum())).transpose(0, 2, 1, 3)
     left = np.arange(switched.size)
     right = left + 1
     right[switched] = switched.size + np.arange(ends.size)
     sides = [(own[k], forced[k]) for k in (left, right)]
     h = np.diff(nodes.time_s)
-    matrix = np.zeros((h.size, n, 3, 3))
+    matrix = np.zeros((h.size, n, states, states))
     matrix[:, :, 0, 1] = 1.0
     matrix[:, :, 1:, :] = (sides[0][0] + sides[1][0]) / 2
     forces = []
     for _, forced in sides:
-        b = np.zeros((h.size, n, 3, forced.shape[-1]))
+        b = np.zeros((h.size, n, states, forced.shape[-1]))
         b[:, :, 1:] = forced
         forces.append(b)
     hh = np.repeat(h[:, None], n, axis=1)
-    states = _solve(_decay(matrix, hh), _forcing(matrix, hh, *forces), np.zeros_like(forces[0][0]))
-    out[:, :, acting] = states[:, :, :2].transpose(0, 2, 1, 3).reshape(h.size + 1, 2 * n, -1)
+    found = _solve(_decay(matrix, hh), _forcing(matrix, hh, *forces), np.zeros_like(forces[0][0]))
+    out[:, :, acting] = found[:, :, :2].transpose(0, 2, 1, 3).reshape(h.size + 1, 2 * n, -1)
     return out
 
 
@@ -182,15 +206,18 @@ def _acting(structure: Structure, seeds: np.ndarray) -> np.ndarray:
 
 
 def variation(
-    structure: Structure, nodes: Nodes, seeds: np.ndarray, heading_rad: float, width: float
+    structure: Structure, nodes: Nodes, p: np.ndarray, seeds: np.ndarray, heading_rad: float, width: float
 ) -> Variation:
-    """Return the sensitivities of pose and curvature to the coordinates behind `seeds` (parameters, K)."""
-    shape = shape_variation(structure, nodes, seeds, width)
+    """Return the sensitivities of pose and curvature to the coordinates behind `seeds` (parameters, K).
+
+    `p` and the rows of `seeds` are the parameters of `structure`, which may be smaller than the nodes' own.
+    """
+    shape = shape_variation(structure, nodes, p, seeds, width)
     rate, by_body, by_shape, by_p = evaluate(
-        _body_slopes(structure), (nodes.body, nodes.kappa, nodes.dkappa), nodes.p
+        _body_slopes(structure), (nodes.body, nodes.kappa, nodes.dkappa), p
     )
     count = nodes.time_s.size
-    a = by_body.reshape(count, 6, 6).transpose(0, 2, 1)
+    a = np.ascontiguousarray(by_body.reshape(count, 6, 6).transpose(0, 2, 1))
     c = by_shape.reshape(count, -1, 6).transpose(0, 2, 1)
     d = by_p.reshape(count, -1, 6).transpose(0, 2, 1)
     touched = np.any(seeds != 0, axis=1)
@@ -198,6 +225,6 @@ def variation(
     h = np.diff(nodes.time_s)
     middle = (a[:-1] + a[1:]) / 2
     start = np.zeros((6, seeds.shape[1]))
-    start[:3] = start_pose(structure, nodes.p, heading_rad)[1] @ seeds
+    start[:3] = start_pose(structure, p, heading_rad)[1] @ seeds
     states = _solve(_decay(middle, h), _forcing(middle, h, b[:-1], b[1:]), start)
     return Variation(states[:, :3], shape[:, : structure.segments], rate)

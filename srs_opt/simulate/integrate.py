@@ -5,40 +5,23 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 
-import casadi as ca
 import numpy as np
 
 from srs_opt.errors import NoAnswerError
 from srs_opt.model.parameters import Structure, valve_delay_s
 from srs_opt.model.registry import build
 from srs_opt.robot import Robot
-from srs_opt.simulate.compiled import compiled
 from srs_opt.simulate.kernel import Kernel
 from srs_opt.simulate.mesh import Mesh
 from srs_opt.simulate.rosenbrock import BODY_STATES, step_function
 from srs_opt.simulate.timeline import Timeline
 from srs_opt.simulate.together import Search, Stretch, alone
 
-BLOCK = 32  # steps per call of the compiled function
 _REFINEMENTS = 3
 STEP_S = 0.005  # first guess of the step
 LOOSE = 8.0  # a mesh is kept while no step errs by more than this many tolerances
 MANY = 32  # alike pieces integrated in one call
 TOLERANCE_M_S = 3e-5  # local error of the body speed per step: about 1e-4 of the distance travelled
-
-
-@lru_cache(maxsize=32)
-def block_function(structure: Structure) -> ca.Function:
-    """Return ``(x, valve (N-1, BLOCK), h (1, BLOCK), p) -> (states (nx, BLOCK), errors (1, BLOCK))``."""
-
-    def make() -> ca.Function:
-        step = step_function(structure)
-        repeated = step.mapaccum("repeated", BLOCK)
-        x, p = ca.MX.sym("x", step.size1_in(0)), ca.MX.sym("p", step.size1_in(3))
-        valve, h = ca.MX.sym("valve", structure.segments, BLOCK), ca.MX.sym("h", 1, BLOCK)
-        return ca.Function("block", [x, valve, h, p], repeated(x, valve, h, ca.repmat(p, 1, BLOCK)))
-
-    return compiled(f"block {BLOCK} {structure}", make)
 
 
 @lru_cache(maxsize=32)
