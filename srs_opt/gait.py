@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -41,6 +42,17 @@ class Gait:
             raise InputError(f"gait: pressure must be at least 0 kPa, found {self.pressure_kpa}")
         for i, intervals in enumerate(self.intervals, start=1):
             _check_intervals(i, intervals, self.period_s)
+
+    def record(self) -> dict[str, Any]:
+        """Return the gait as JSON holds it."""
+        intervals = [[list(pair) for pair in pairs] for pairs in self.intervals]
+        return {"period_s": self.period_s, "pressure_kpa": self.pressure_kpa, "intervals": intervals}
+
+    @staticmethod
+    def of_record(record: dict[str, Any]) -> Gait:
+        """Return the gait of a record (which may hold more); InputError if it is none."""
+        intervals = tuple(tuple((float(a), float(b)) for a, b in pairs) for pairs in record["intervals"])
+        return Gait(float(record["period_s"]), float(record["pressure_kpa"]), intervals)
 
     @property
     def frequency_hz(self) -> float:

@@ -30,6 +30,7 @@ def build_parser() -> Parser:
         "python -m srs_opt.gait_opt",
         "Find the best periodic valve timing by direct collocation; certify it by switch-exact simulation.",
         "python -m srs_opt.gait_opt --objective turn --radius 0.3 --pressure 41 55",
+        sweep=True,
     )
     goal = parser.add_argument_group("what is wanted")
     goal.add_argument(
@@ -56,9 +57,6 @@ def build_parser() -> Parser:
     )
     how.add_argument("--starts", type=positive_int, default=4, metavar="N", help="starting gaits (default 4)")
     how.add_argument("--warm", metavar="FILE", help="start from the gait of an earlier run (its gait.json)")
-    how.add_argument(
-        "--jobs", type=positive_int, default=2, metavar="N", help="processes, --table (default 2)"
-    )
     return parser
 
 
@@ -66,7 +64,7 @@ def _add_limits(parser: Parser) -> None:
     add = parser.add_argument_group("limits").add_argument
     two = {"nargs": 2, "type": positive_float}
     add("--frequency", **two, default=(1.0, 2.0), metavar=("LO", "HI"), help="Hz (default 1 2)")  # type: ignore[arg-type]
-    add("--pressure", **two, metavar=("LO", "HI"), help="kPa (default 41 55; for --table 24 55)")  # type: ignore[arg-type]
+    add("--pressure", **two, metavar=("LO", "HI"), help="kPa (default 41 55; for --table 20 55)")  # type: ignore[arg-type]
     add("--max-curvature", type=positive_float, metavar="1_M", help="largest curvature, 1/m")
     add(
         "--min-dwell",
@@ -162,27 +160,35 @@ def run(options: argparse.Namespace) -> Answer:
 
 def _run_table(options: argparse.Namespace) -> Answer:
     """Build the gait table and write it as JSON, CSV and C header."""
+    import shutil
     import time
 
     from srs_opt.gait_opt.catalogue import cached_table_path
     from srs_opt.gait_opt.export import write_csv, write_header
-    from srs_opt.gait_opt.family import build_table
+    from srs_opt.gait_opt.family import TABLE_PRESSURE_KPA, build_table
     from srs_opt.gait_opt.figures import draw_pareto
+    from srs_opt.gait_opt.goal import Limits
     from srs_opt.gait_opt.table import save_table
     from srs_opt.robot import load_robot
 
     robot = load_robot(options.robot)
     begun = time.perf_counter()
     limits = limits_from(options)
-    table = build_table(robot, options.model, limits, lambda text: say(options, text), options.jobs)
+    unfinished = options.out / "table.unfinished"  # an interrupted table goes on from here
+    table = build_table(
+        robot, options.model, limits, lambda text: say(options, text),
+        jobs=options.jobs, cluster=options.cluster, resume=unfinished,
+    )  # fmt: skip
     seconds = time.perf_counter() - begun
     files = [
         save_table(table, options.out / "gait_table.json"),
         write_csv(table, options.out / "gait_table.csv"),
         write_header(table, options.out / "gait_table.h", options.tick),
-        save_table(table, cached_table_path(robot, options.model)),
         *draw_pareto(table, options.out / "pareto"),
     ]
+    if limits == Limits(pressure_kpa=TABLE_PRESSURE_KPA):  # then `plan` may take it without being told
+        files.append(save_table(table, cached_table_path(robot, options.model)))
+    shutil.rmtree(unfinished, ignore_errors=True)
     best = max(g.speed_m_s for g in table.gaits)
     radii = [abs(g.radius_m) for g in table.gaits if g.radius_m is not None]
     answer = {

@@ -63,6 +63,35 @@ class TableGait:
             orbit.work_j,
         )
 
+    def record(self) -> dict[str, Any]:
+        """Return the entry as JSON holds it."""
+        return {
+            "name": self.name,
+            **self.gait.record(),
+            "speed_m_s": self.speed_m_s,
+            "turn_rate_rad_s": self.turn_rate_rad_s,
+            "radius_m": self.radius_m,
+            "envelope_m": list(self.envelope_m),
+            "displacement": list(self.displacement),
+            "friction_work_j": self.friction_work_j,
+        }
+
+    @staticmethod
+    def of_record(record: dict[str, Any]) -> TableGait:
+        """Return the entry of a record; InputError if its gait is not valid."""
+        right, left = record["envelope_m"]
+        dx, dy, turn = record["displacement"]
+        return TableGait(
+            record["name"],
+            Gait.of_record(record),
+            record["speed_m_s"],
+            record["turn_rate_rad_s"],
+            record["radius_m"],
+            (right, left),
+            (dx, dy, turn),
+            record["friction_work_j"],
+        )
+
 
 @dataclass(frozen=True)
 class GaitTable:
@@ -86,21 +115,6 @@ class GaitTable:
         return self.gaits[int(distance.argmin())]
 
 
-def _gait_record(entry: TableGait) -> dict[str, Any]:
-    return {
-        "name": entry.name,
-        "period_s": entry.gait.period_s,
-        "pressure_kpa": entry.gait.pressure_kpa,
-        "intervals": [[list(pair) for pair in pairs] for pairs in entry.gait.intervals],
-        "speed_m_s": entry.speed_m_s,
-        "turn_rate_rad_s": entry.turn_rate_rad_s,
-        "radius_m": entry.radius_m,
-        "envelope_m": list(entry.envelope_m),
-        "displacement": list(entry.displacement),
-        "friction_work_j": entry.friction_work_j,
-    }
-
-
 def save_table(table: GaitTable, path: Path | str) -> Path:
     """Write a gait table as JSON (schema: gait_table.schema.json)."""
     record = {
@@ -108,7 +122,7 @@ def save_table(table: GaitTable, path: Path | str) -> Path:
         "robot": table.robot_name,
         "fingerprint": table.fingerprint,
         "model": table.model,
-        "gaits": [_gait_record(g) for g in table.gaits],
+        "gaits": [g.record() for g in table.gaits],
     }
     return write_text(path, json.dumps(record, indent=1, allow_nan=False) + "\n")
 
@@ -139,24 +153,9 @@ def load_table(path: Path | str, robot: Robot | None = None) -> GaitTable:
 
 def _entries(document: Document) -> tuple[TableGait, ...]:
     entries = []
-    for index, g in enumerate(document.value["gaits"]):
+    for index, record in enumerate(document.value["gaits"]):
         try:
-            intervals = tuple(tuple((float(a), float(b)) for a, b in pairs) for pairs in g["intervals"])
-            gait = Gait(float(g["period_s"]), float(g["pressure_kpa"]), intervals)
+            entries.append(TableGait.of_record(record))
         except InputError as error:
             raise document.error(("gaits", index), str(error)) from error
-        right, left = g["envelope_m"]
-        dx, dy, turn = g["displacement"]
-        entries.append(
-            TableGait(
-                g["name"],
-                gait,
-                g["speed_m_s"],
-                g["turn_rate_rad_s"],
-                g["radius_m"],
-                (right, left),
-                (dx, dy, turn),
-                g["friction_work_j"],
-            )
-        )
     return tuple(entries)

@@ -10,11 +10,14 @@ import numpy as np
 import pytest
 
 from srs_opt.errors import InputError
+from srs_opt.gait_opt import family
 from srs_opt.gait_opt.catalogue import default_table, shipped_table
 from srs_opt.gait_opt.export import c_header, write_csv, write_header
-from srs_opt.gait_opt.family import chains, wishes
+from srs_opt.gait_opt.family import build_table
+from srs_opt.gait_opt.ladder import Rung
 from srs_opt.gait_opt.table import GaitTable, load_table, save_table
 from srs_opt.gait_opt.ticks import LEFT_BIT, RIGHT_BIT, Schedule
+from srs_opt.gait_opt.wishes import Wish, generations, wishes
 from srs_opt.orbit.steady import steady_gait
 from srs_opt.robot import wpi_srs
 
@@ -33,7 +36,14 @@ def test_shipped_table_holds_what_a_planner_needs(table):
     straight = [g for g in table.gaits if g.radius_m is None]
     assert max(g.speed_m_s for g in straight) >= 0.545
     assert min(g.speed_m_s for g in straight) <= -0.545
-    assert any(sum(g.envelope_m) <= 0.0705 and g.speed_m_s > 0.4 for g in straight)
+    bands = sorted(sum(g.envelope_m) for g in straight if g.speed_m_s > 0.2)
+    assert bands[0] <= 0.053
+    assert max(np.diff([b for b in bands if b < 0.08])) < 0.007
+    tight = [g for g in table.gaits if g.radius_m is not None and 0.09 < abs(g.radius_m) < 0.13]
+    for side in (1, -1):
+        for way in (1, -1):
+            slim = [g for g in tight if side * g.radius_m > 0 and way * g.speed_m_s > 0.2]
+            assert min(sum(g.envelope_m) for g in slim) <= 0.0605
     for side in (1, -1):
         radii = [side * g.radius_m for g in table.gaits if g.radius_m and side * g.radius_m > 0]
         assert min(radii) < 0.12
@@ -67,10 +77,14 @@ def test_table_of_another_robot_is_refused(table, tmp_path):
         load_table(path, ROBOT.with_values(tau1_s=0.1))
 
 
-def test_wishes_come_in_chains_by_band():
-    assert sum(map(len, chains(ROBOT))) == len(wishes(ROBOT))
-    for chain in chains(ROBOT):
-        assert len({w.band_m for w in chain}) == 1
+def test_every_wish_starts_from_one_of_an_earlier_generation():
+    asked = wishes(ROBOT)
+    assert len({w.name for w in asked}) == len(asked)
+    done = {None}
+    for group in generations(asked):
+        assert {w.after for w in group} <= done
+        done |= {w.name for w in group}
+    assert len(done) == len(asked) + 1
 
 
 def test_csv_has_a_row_per_interval(table, tmp_path):
@@ -131,3 +145,31 @@ def test_header_never_opens_both_valves(table):
 def test_nearest_gait(table):
     assert table.nearest(0.55, 0.0).speed_m_s > 0.5
     assert np.sign(table.nearest(0.4, -3.0).turn_rate_rad_s) == -1
+
+
+@pytest.fixture
+def short_table(monkeypatch):
+    """Make tables of three coarse gaits."""
+    asked = (Wish("a", None, None, None), Wish("b", None, 0.08, "a"), Wish("c R0.784", 0.784, None, "a"))
+    monkeypatch.setattr(family, "wishes", lambda robot: asked)
+    monkeypatch.setattr(family, "ladder", lambda own_m_s: (Rung(0.03, 30, 0.1, 1),))
+
+
+@pytest.mark.slow
+def test_an_interrupted_table_goes_on_and_has_the_same_bits(short_table, monkeypatch, tmp_path):
+    whole = build_table(ROBOT, jobs=1)
+
+    def interrupt(line):
+        if line.startswith("b"):
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        build_table(ROBOT, say=interrupt, jobs=1, resume=tmp_path / "kept")
+    fulfil, asked = family._fulfil, []
+    monkeypatch.setattr(
+        family, "_fulfil", lambda work, task: asked.append(task.wish.name) or fulfil(work, task)
+    )
+    resumed = build_table(ROBOT, jobs=1, resume=tmp_path / "kept")
+    assert asked == ["c R0.784"]
+    assert resumed == whole
+    assert len(whole.gaits) == 8
