@@ -64,7 +64,9 @@ def make_parser(
         "--json", action="store_true", help="print one JSON object on stdout and nothing else there"
     )
     parser.add_argument("--quiet", action="store_true", help="no progress, no messages")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of all randomness (default 0)")
+    parser.add_argument(
+        "--seed", type=seed_number, default=0, metavar="N", help="seed of all randomness (default 0)"
+    )
     if sweep:
         parser.add_argument(
             "--jobs",
@@ -164,6 +166,13 @@ def positive_int(text: str) -> int:
     if value < 1:
         raise argparse.ArgumentTypeError(f"expected a whole number above 0, found '{text}'")
     return value
+
+
+def seed_number(text: str) -> int:
+    """Parse a whole number, zero or above."""
+    if not (text.isascii() and text.isdigit()):
+        raise argparse.ArgumentTypeError(f"expected a whole number from 0, found '{text}'")
+    return int(text)
 
 
 def finite_float(text: str) -> float:

@@ -42,7 +42,13 @@ def calibrate(
     if not trials:
         if not dataset.maps:
             raise InputError(f"data set '{dataset.name}': no usable trial and no map to calibrate on")
-        return fit_maps(dataset, model)
+        return fit_maps(dataset, model, tell)
+    for t in trials:
+        if t.markers_m is not None and t.markers_m.shape[1] != dataset.robot.links:
+            raise InputError(
+                f"trial {t.name} has {t.markers_m.shape[1]} markers, robot '{dataset.robot.name}' has "
+                f"{dataset.robot.links} links"
+            )
     base = base_coordinates(dataset.robot)
     experiment = Experiment(Model(dataset.robot, model), trials, noise_sd_m(dataset), dataset.bench)
     with Crew(experiment, jobs) if jobs > 1 else nullcontext():

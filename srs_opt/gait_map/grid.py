@@ -54,12 +54,10 @@ def grid_points(
     lags_rad: Sequence[float],
 ) -> list[Point]:
     """Return all combinations, the frequency running fastest (neighbours help each other's start)."""
-    points = [(f, p, o, g) for g in lags_rad for o in offsets for p in pressures_kpa for f in frequencies_hz]
-    if len(points) > LARGEST_MAP:
-        raise InputError(
-            f"map of {len(points)} gaits is too large (limit {LARGEST_MAP}); ask for fewer steps"
-        )
-    return points
+    count = len(frequencies_hz) * len(pressures_kpa) * len(offsets) * len(lags_rad)
+    if count > LARGEST_MAP:
+        raise InputError(f"map of {count} gaits is too large (limit {LARGEST_MAP}); ask for fewer steps")
+    return [(f, p, o, g) for g in lags_rad for o in offsets for p in pressures_kpa for f in frequencies_hz]
 
 
 def map_points(robot: Robot, model: str, points: Sequence[Point]) -> list[tuple[float, ...]]:

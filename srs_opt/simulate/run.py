@@ -16,7 +16,7 @@ from srs_opt.simulate import compiled
 from srs_opt.simulate.integrate import TOLERANCE_M_S, Integrator, Trajectory
 from srs_opt.simulate.timeline import Timeline
 
-LONGEST_S = 100_000.0
+LONGEST_S, MOST_CYCLES = 100_000.0, 1_000_000
 _CHECKED_CYCLES = 4
 
 
@@ -55,10 +55,15 @@ def simulate(
     Raises
     ------
     InputError
-        If the duration is out of range or the gait does not fit the robot.
+        If the duration is out of range, in seconds or cycles, or the gait does not fit the robot.
     """
     if not 0 < duration_s <= LONGEST_S:
         raise InputError(f"duration must be above 0 and at most {LONGEST_S:g} s, found {duration_s:g}")
+    if duration_s > MOST_CYCLES * gait.period_s:
+        raise InputError(
+            f"{duration_s:g} s at {1 / gait.period_s:g} Hz are more than {MOST_CYCLES} cycles; "
+            "lower the duration or the frequency"
+        )
     if gait.segments != robot.segments:
         raise InputError(f"gait drives {gait.segments} segments, robot '{robot.name}' has {robot.segments}")
     before = compiled.compile_seconds

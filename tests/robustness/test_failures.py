@@ -45,6 +45,8 @@ CASES = [
     ("srs_opt.simulate", ["--frequenzy", "1"], 2, "unrecognized arguments"),
     ("srs_opt.simulate", ["--offset", "1.2"], 2, "between -1 and 1"),
     ("srs_opt.simulate", ["--duration", "1e9"], 2, "duration"),
+    ("srs_opt.simulate", ["--frequency", "1e9"], 2, "cycles"),
+    ("srs_opt.simulate", ["--seed", "-1"], 2, "whole number from 0"),
     ("srs_opt.simulate", ["--robot", "{tmp}/absent.yaml"], 2, "no such file"),
     ("srs_opt.simulate", ["--robot", "{tmp}"], 2, "is a folder"),
     ("srs_opt.simulate", ["--robot", "{tmp}/typo.yaml"], 2, "typo.yaml:1: lenght: unknown key"),
@@ -63,8 +65,11 @@ CASES = [
     ("srs_opt.gait_map", ["--frequency", "1", "2"], 2, "expected 3 arguments"),
     ("srs_opt.gait_map", ["--offset", "1.5"], 2, "between -1 and 1"),
     ("srs_opt.gait_map", ["--jobs", "0"], 2, "whole number above 0"),
+    ("srs_opt.gait_map", ["--frequency", "1", "2", "9999", "--pressure", "9", "55", "9999"], 2, "too large"),
+    ("srs_opt.gait_map", ["--cluster", "nowhere"], 2, "no Dask scheduler"),
     ("srs_opt.drive", [], 2, "--speed"),
     ("srs_opt.drive", ["--speed", "0.1", "--radius", "1", "--turn-rate", "1"], 2, "not both"),
+    ("srs_opt.drive", ["--speed", "nan"], 2, "expected a finite number"),
     ("srs_opt.drive", ["--speed", "0.1", "--map", "{tmp}/map.csv"], 2, "map.csv:1: expected the columns"),
     ("srs_opt.measurement", ["{tmp}/absent", "--quiet"], 2, "absent"),
     ("srs_opt.measurement", ["{tmp}/set", "--quiet"], 2, "dataset.yaml"),
@@ -83,6 +88,10 @@ CASES = [
     ("planners.plan", ["mazes/first.yaml", "--gaits", "{tmp}/table.json"], 2, "table.json"),
     ("planners.plan", ["mazes/first.yaml", "--planner", "magic"], 2, "invalid choice"),
     ("planners.plan", ["mazes/first.yaml", "--margin", "-1"], 2, "--margin"),
+    ("planners.plan", ["mazes/first.yaml", "--margin", "5"], 2, "--margin"),
+    ("planners.plan", ["mazes/first.yaml", "--scale", "1e-6"], 2, "start"),
+    ("planners.plan", ["mazes/first.yaml", "--true-robot", "{tmp}/absent.yaml"], 2, "no such file"),
+    ("planners.plan", ["mazes/first.yaml", "--drive", "{tmp}/table.json"], 2, "drive calibration"),
     ("planners.plan", ["mazes/first.yaml", "--animate", "film.avi"], 2, "film.avi"),
     ("srs_opt.gait_opt", ["--objective", "fame"], 2, "invalid choice"),
     ("srs_opt.gait_opt", ["--frequency", "2", "1"], 2, "low <= high"),
@@ -96,11 +105,15 @@ CASES = [
     ("srs_opt.calibrate", ["{tmp}/absent"], 2, "absent"),
     ("srs_opt.calibrate", ["{tmp}/set"], 2, "dataset.yaml"),
     ("srs_opt.discrepancy", ["{tmp}/absent"], 2, "absent"),
-    ("srs_opt.discrepancy", ["{tmp}/set", "--effects", "{tmp}/typo.yaml"], 2, ""),
+    ("srs_opt.discrepancy", ["{tmp}/set", "--effects", "{tmp}/typo.yaml"], 2, "dataset.yaml"),
     ("planners.motion", ["--gaits", "{tmp}/absent.json"], 2, "no such file"),
     ("planners.motion", ["--gaits", "{tmp}/old_table.json"], 2, "version"),
-    ("planners.generate", ["--rows", "0"], 2, ""),
+    ("planners.generate", ["--rows", "0"], 2, "unrecognized"),
+    ("planners.generate", ["--cells", "1"], 2, "4 to 200"),
+    ("planners.generate", ["--style", "rooms", "--format", "txt"], 2, "write rooms as yaml"),
+    ("planners.generate", ["--wall", "99"], 2, "too thick"),
     ("planners.view", ["{tmp}/absent"], 2, "no such file"),
+    ("planners.view", ["{tmp}/walls.yaml"], 2, "not valid JSON"),
     ("planners.view", ["{tmp}/motion.json"], 2, "motion.json"),
 ]  # fmt: skip
 
@@ -159,6 +172,32 @@ def test_failure_with_json_keeps_stdout_clean_or_one_object(files, capsys, monke
     _, out, err = run("srs_opt.simulate", ["--robot", "{tmp}/typo.yaml", "--json"], files, capsys)
     assert not out or isinstance(json.loads(out), dict)
     assert len(err.strip().splitlines()) == 1
+
+
+def test_robot_that_does_not_fit_the_tracks(files, capsys):
+    """A set of five markers, a robot of three links."""
+    folder = files / "lines"
+    (folder / "trials").mkdir(parents=True)
+    texts = {
+        "dataset.yaml": FILES["set/dataset.yaml"].replace("sideways", "tail_to_head"),
+        "robot.yaml": "name: x\n",
+        "trials.csv": "trial,frequency_hz,pressure_kpa,offset,phase_lag_rad,heading_rad,duration_s\n"
+        "a,1,50,0,1.57,0,1\n",
+        "three.yaml": "links: 3\n",
+        "trials/a.csv": "time_s,x1_m,y1_m,x2_m,y2_m,x3_m,y3_m,x4_m,y4_m,x5_m,y5_m\n"
+        + "".join(
+            f"{k / 100:g}," + ",".join(f"{0.049 * i + 1e-4 * k:.4f},0" for i in range(5)) + "\n"
+            for k in range(100)
+        ),
+    }
+    for name, text in texts.items():
+        (folder / name).write_text(text)
+    status, out, err = run(
+        "srs_opt.calibrate", [str(folder), "--robot", "{tmp}/lines/three.yaml"], files, capsys
+    )
+    assert status == 2, err
+    assert "5 markers" in err
+    assert not out
 
 
 def commands() -> list[str]:
