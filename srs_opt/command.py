@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, NoReturn, TypeVar
 
 from srs_opt.errors import InputError, NoAnswerError, SrsError
+from srs_opt.files import check_can_write
 
 T = TypeVar("T")
 FAULT = 70  # exit status of a bug (EX_SOFTWARE); 0, 1 and 2 are answers
@@ -92,6 +93,7 @@ def run_command(
     try:
         if options.out is None:
             options.out = Path("out") / parser.prog.split()[-1].split(".")[-1]
+        check_can_write(options.out)
         answer = run(options)
         if options.json:
             print(json.dumps(answer.record, allow_nan=False))

@@ -44,6 +44,22 @@ def _explained(target: Path) -> Iterator[None]:
         raise InputError(f"{target}: cannot write: {reason}; choose another folder with --out") from error
 
 
+def check_can_write(folder: Path) -> None:
+    """Complain before long work rather than after it.
+
+    Raises
+    ------
+    InputError
+        If files cannot be made in `folder`, or, when it does not exist yet, where it would be made.
+    """
+    place = folder
+    while not place.exists():
+        place = place.parent
+    if place != folder or place.is_dir():  # a file called `folder` may be meant as the answer's name
+        with _explained(folder), tempfile.TemporaryFile(dir=place):
+            pass
+
+
 def write_text(target: Path | str, text: str) -> Path:
     """Write `text` (UTF-8, Unix line ends) to `target` atomically."""
     with atomic_path(target) as temporary:

@@ -62,10 +62,16 @@ def test_out_is_a_file(arguments, tmp_path):
 
 
 @pytest.mark.skipif(not Path("/proc/version").exists(), reason="no folder that even root may not write to")
-def test_read_only_folder():
-    done = run(SIMULATE, "--out", "/proc/srs", "--quiet")
+@pytest.mark.parametrize(
+    "arguments", [SIMULATE, ["srs_opt.gait_opt"], ["planners.plan", "mazes/first.yaml"]], ids=lambda a: a[0]
+)
+def test_read_only_folder(arguments):
+    """Said at once, not after minutes of work."""
+    began = time.perf_counter()
+    done = run(arguments, "--out", "/proc/srs", "--quiet")
     assert done.returncode == 2
     assert "cannot write" in one_line(done)
+    assert time.perf_counter() - began < 20
 
 
 def test_disk_full(tmp_path):
