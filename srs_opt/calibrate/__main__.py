@@ -20,7 +20,8 @@ def build_parser() -> Parser:
         "Fit friction, curvature per pressure and time constants to all trials of a data set at once, bench\n"
         "values as priors; write robot.yaml with estimates and relative standard deviations.\n"
         "JSON: parameters and sd (SI units, pressure in kPa), unidentifiable (directions the data say\n"
-        "nothing about), misfit {before, after} (root mean square over the noise).",
+        "nothing about), misfit {before, after} (root mean square over the noise), data (tracks or maps)\n"
+        "and, from maps alone, sd_with_tracks (what tracks of the same gaits would leave; else null).",
         "python -m srs_opt.calibrate data/my_set --json",
         robot=False,
     )
@@ -62,6 +63,8 @@ def _record(found: Calibration) -> dict[str, object]:
         "sd": found.sd,
         "unidentifiable": list(found.unidentifiable),
         "misfit": {"before": found.before, "after": found.after},
+        "data": "tracks" if found.sd_with_tracks is None else "maps",
+        "sd_with_tracks": found.sd_with_tracks,
         "correlation": {
             a: {b: round(float(found.correlation[i, j]), 4) for j, b in enumerate(names)}
             for i, a in enumerate(names)
@@ -75,6 +78,10 @@ def _summary(found: Calibration) -> str:
     lines.append(f"misfit over noise: {found.before:.3f} -> {found.after:.3f}")
     if found.unidentifiable:
         lines.append("the data say nothing about: " + "; ".join(found.unidentifiable))
+    if found.sd_with_tracks is not None:
+        lines.append("from maps alone; 8 s of track of every gait would know better by the factor")
+        less = {n: sd / found.sd_with_tracks[n] for n, sd in found.sd.items()}
+        lines.append(", ".join(f"{name} {factor:.2g}" for name, factor in less.items()))
     if found.after > 1.1:
         lines.append("the model does not explain the data: see python -m srs_opt.discrepancy")
     return "\n".join(lines)

@@ -4,192 +4,33 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
-from srs_opt.calibrate.coordinates import SCATTER_SD, Coordinate
-from srs_opt.calibrate.gram import Solution, TrialGram, bounded_solve, trial_gram
-from srs_opt.calibrate.instruments import NAME, reading_gram, readings
-from srs_opt.calibrate.model import Model
-from srs_opt.calibrate.noise import track_of
-from srs_opt.calibrate.nominal import Nodes, TrialRun, tolerance_for
-from srs_opt.calibrate.observe import Prediction, predict
+from srs_opt.calibrate.coordinates import Coordinate
+from srs_opt.calibrate.experiment import Experiment, Extra, Point
+from srs_opt.calibrate.gram import Solution, TrialGram, bounded_solve
 from srs_opt.errors import NoAnswerError
-from srs_opt.measurement.records import Bench, Trial
-from srs_opt.simulate.together import together
-
-if TYPE_CHECKING:
-    from srs_opt.calibrate.crew import Crew
+from srs_opt.measurement.records import Trial
 
 ITERATIONS = 12
 CONVERGED = 0.1  # of the deviance
-CORRELATED = 100.0  # values that a smooth misfit makes count as one
+CORRELATED = 100.0  # values of a track that a smooth misfit makes count as one
 LONGEST_LOG_STEP = 0.7
 HOPELESS = 300.0  # deviance that even the linearisation promises to stay behind the one to beat
 TRIED = 2  # iterations before that is believed
 Report = Callable[[str], None]
-Extra = Callable[[Trial, Prediction], np.ndarray]
 
 
-@dataclass(frozen=True)
-class Point:
-    """Where a model stands: shared coordinates and every trial's scatter.
-
-    Attributes
-    ----------
-    values : dict
-        Coordinate -> value.
-    scatter : dict
-        Trial name -> array of log factors on friction along, across and curvature.
-    """
-
-    values: dict[str, float]
-    scatter: dict[str, np.ndarray] = field(default_factory=dict)
-
-    def of_trial(self, name: str) -> dict[str, float]:
-        """Return the values with the trial's own scatter added."""
-        own = dict(self.values)
-        for parameter, b in zip(SCATTER_SD, self.scatter.get(name, np.zeros(len(SCATTER_SD)))):
-            own[parameter] = own.get(parameter, 0.0) + float(b)
-        return own
-
-
-class Experiment:
-    """The trials of a data set and the model that is held against them.
-
-    Parameters
-    ----------
-    model : Model
-    trials : sequence of Trial
-    sd_m : float
-        Noise per coordinate.
-    bench : Bench, optional
-        Readings of other instruments to hold the model against too.
-    tolerance_m_s : float, optional
-        Of the simulation; default: what the trials' number of values asks for.
-    """
-
-    def __init__(
-        self,
-        model: Model,
-        trials: Sequence[Trial],
-        sd_m: float,
-        bench: Bench | None = None,
-        tolerance_m_s: float | None = None,
-    ) -> None:
-        self.model, self.trials, self.sd_m = model, tuple(trials), sd_m
-        self.readings = readings(model, bench) if bench is not None else ()
-        self.runs = {t.name: TrialRun(model, t) for t in self.trials}
-        self.tracks = {t.name: track_of(t) for t in self.trials}
-        count = sum(track.size for track in self.tracks.values() if track is not None)
-        self.tolerance_m_s = tolerance_m_s or tolerance_for(count, sd_m)
-        self.scatter_sd = np.array(list(SCATTER_SD.values()))
-        self.crew: Crew | None = None
-
-    def predict(
-        self,
-        trial: Trial,
-        point: Point,
-        coordinates: Sequence[Coordinate] = (),
-        tolerance_m_s: float | None = None,
-    ) -> Prediction:
-        """Return the prediction of one trial at `point`."""
-        nodes = self.runs[trial.name](point.of_trial(trial.name), tolerance_m_s or self.tolerance_m_s)
-        return self._seen(trial, nodes, point, coordinates)
-
-    def _seen(
-        self, trial: Trial, nodes: Nodes, point: Point, coordinates: Sequence[Coordinate]
-    ) -> Prediction:
-        values = point.of_trial(trial.name)
-        centre_only = trial.markers_m is None
-        return predict(self.model, trial, nodes, values, coordinates, centre_only=centre_only)
-
-    def residual(self, trial: Trial, prediction: Prediction) -> np.ndarray:
-        """Return measured minus predicted, (T, 2 M)."""
-        track = self.tracks[trial.name]
-        assert track is not None
-        return np.asarray(track - prediction.points)
-
-    def gram(
-        self,
-        trial: Trial,
-        point: Point,
-        coordinates: Sequence[Coordinate],
-        extra: Extra | None = None,
-    ) -> TrialGram:
-        """Return the trial's Gram matrix over `coordinates`, then the residual functions `extra`.
-
-        The coordinates must include the scattering parameters.
-        """
-        return self.own_grams((trial,), point, coordinates, extra)[trial.name]
-
-    def own_grams(
-        self,
-        trials: Sequence[Trial],
-        point: Point,
-        coordinates: Sequence[Coordinate],
-        extra: Extra | None = None,
-    ) -> dict[str, TrialGram]:
-        """Return the Gram matrices of `trials`, simulated side by side in this process."""
-        nodes = together(
-            [self.runs[t.name].search(point.of_trial(t.name), self.tolerance_m_s) for t in trials]
-        )
-        found = {}
-        for trial, run in zip(trials, nodes):
-            if isinstance(run, NoAnswerError):
-                raise run
-            found[trial.name] = self._gram(trial, run, point, coordinates, extra)
-        return found
-
-    def _gram(
-        self,
-        trial: Trial,
-        nodes: Nodes,
-        point: Point,
-        coordinates: Sequence[Coordinate],
-        extra: Extra | None,
-    ) -> TrialGram:
-        prediction = self._seen(trial, nodes, point, coordinates)
-        residual = self.residual(trial, prediction)
-        slopes = prediction.slopes.reshape(residual.size, -1)
-        if extra is not None:
-            slopes = np.column_stack([slopes, extra(trial, prediction).reshape(residual.size, -1)])
-        names = [c.name for c in coordinates]
-        scattered = [names.index(n) for n in SCATTER_SD]
-        now = point.scatter.get(trial.name, np.zeros(len(SCATTER_SD)))
-        gram = trial_gram(residual.ravel(), slopes, self.sd_m, scattered, self.scatter_sd, now)
-        return replace(gram, serial=serial_correlation(residual / self.sd_m))
+class Measured(Protocol):
+    """What a fit is held against."""
 
     def grams(
-        self,
-        point: Point,
-        coordinates: Sequence[Coordinate],
-        trials: Sequence[Trial] | None = None,
-        extra: Extra | None = None,
+        self, point: Point, coordinates: Sequence[Coordinate], trials: Sequence[Trial] | None = None
     ) -> dict[str, TrialGram]:
-        """Return the Gram matrices of several trials."""
-        chosen = self.trials if trials is None else trials
-        if self.crew is not None:
-            found = self.crew.grams(chosen, point, coordinates, extra)
-        else:
-            found = self.own_grams(chosen, point, coordinates, extra)
-        if self.readings and found:
-            further = next(iter(found.values())).raw.shape[0] - 1 - len(coordinates)
-            found[NAME] = reading_gram(self.readings, point.values, coordinates, further)
-        return found
-
-
-def serial_correlation(residual: np.ndarray, lags: int = 8) -> float:
-    """Return the standardised sum of products of residuals (T, n) up to `lags` frames apart (NaN: lost)."""
-    total, count = 0.0, 0
-    for lag in range(1, min(lags, residual.shape[0] - 1) + 1):
-        products = residual[lag:] * residual[:-lag]
-        seen = np.isfinite(products)
-        total += float(products[seen].sum())
-        count += int(seen.sum())
-    return total / math.sqrt(count) if count else 0.0
+        """Return the normal equations at `point`, by trial."""
 
 
 @dataclass(frozen=True)
@@ -250,24 +91,25 @@ def misfit_ratio(grams: Mapping[str, TrialGram]) -> float:
     return sum(g.misfit for g in grams.values()) / sum(g.count for g in grams.values())
 
 
-def temper_of(grams: Mapping[str, TrialGram]) -> float:
+def temper_of(grams: Mapping[str, TrialGram], correlated: float = CORRELATED) -> float:
     """Return the factor on the noise variance that a misfit calls for.
 
-    What a wrong model leaves behind is smooth in time and alike over the markers, so that CORRELATED values
+    What a wrong model leaves behind is smooth in time and alike over the markers, so that `correlated` values
     count as one; without this, thousands of frames would pull the parameters far from their bench values.
     """
     count, ratio = sum(g.count for g in grams.values()), misfit_ratio(grams)
-    return 1 + CORRELATED * max(0.0, ratio - 1 - 4 * math.sqrt(2 / count))
+    return 1 + correlated * max(0.0, ratio - 1 - 4 * math.sqrt(2 / count))
 
 
 def fit(
-    experiment: Experiment,
+    experiment: Measured,
     coordinates: Sequence[Coordinate],
     start: Point | None = None,
     trials: Sequence[Trial] | None = None,
     iterations: int = ITERATIONS,
     report: Report | None = None,
     beat: float = math.inf,
+    correlated: float = CORRELATED,
 ) -> Fit:
     """Return the most probable values of `coordinates` given the trials.
 
@@ -279,6 +121,8 @@ def fit(
         Default: all of the experiment.
     beat : float
         A deviance; a fit that cannot come near it is not finished.
+    correlated : float
+        Values that a misfit makes count as one: see `temper_of`.
 
     Raises
     ------
@@ -296,7 +140,7 @@ def fit(
     done, converged, damping, behind = 0, False, 0.0, math.inf
     while done < iterations and not converged:
         done += 1
-        temper = temper_of(grams)
+        temper = temper_of(grams, correlated)
         now = objective(coordinates, grams, point, temper)
         moved = _moved(point, coordinates, grams, temper, damping)
         try:
@@ -318,11 +162,11 @@ def fit(
         if done >= TRIED and excess > HOPELESS and excess > 0.5 * behind:
             break
         behind = excess
-        if temper_of(grams) == 1 and objective(coordinates, grams, point, 1.0) - promised < CONVERGED:
-            converged = True
+        missing = objective(coordinates, grams, point, 1.0) - promised
+        converged |= temper_of(grams, correlated) == 1 and missing < CONVERGED
         if report is not None:
             report(f"misfit {sum(g.misfit for g in grams.values()):.0f}")
-    temper = temper_of(grams)
+    temper = temper_of(grams, correlated)
     return Fit(
         coordinates,
         point,
@@ -394,3 +238,6 @@ def _moved(
 def sum_eliminated(grams: Mapping[str, TrialGram], temper: float = 1.0) -> np.ndarray:
     """Return the sum of the trials' matrices, scatter integrated out."""
     return np.sum([g.eliminated(temper).matrix for g in grams.values()], axis=0)
+
+
+__all__ = ["Experiment", "Extra", "Fit", "Measured", "Point", "fit"]

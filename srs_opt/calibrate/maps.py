@@ -1,119 +1,170 @@
-"""Calibration from maps alone: speeds and radii of steady gaits, which know much less than tracks."""
+"""Calibration from maps alone: speeds and curvatures of steady gaits' paths, which know less than tracks."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from srs_opt.calibrate.coordinates import FRICTION_SPEED, SCATTER_SD, Coordinate, base_coordinates
-from srs_opt.calibrate.fit import Fit, Point
+from srs_opt.calibrate.coordinates import SCATTER_SD, Coordinate, base_coordinates
+from srs_opt.calibrate.experiment import Experiment, Point
+from srs_opt.calibrate.fit import fit, priors, start_point, sum_eliminated
+from srs_opt.calibrate.gram import TrialGram, solve
+from srs_opt.calibrate.model import Model
 from srs_opt.calibrate.result import Calibration, calibration
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Wave
-from srs_opt.measurement.records import DataSet, MapRow
-from srs_opt.orbit.steady import steady_gait
+from srs_opt.measurement.records import DataSet, MapRow, Trial
+from srs_opt.orbit.sensitivity import sensitivity
+from srs_opt.orbit.steady import Orbit, steady_gaits
 from srs_opt.robot import Robot
 
-ITERATIONS = 4
-STEP = 0.01  # of a log; speeds are smooth in the parameters well beyond this
-MOST_ROWS = 60
-LEAST_SD_M_S = 1e-4
+LEAST_SD = np.array([1e-4, 0.01])  # speed in m/s, path's curvature in 1/m
+STRAIGHT_SD_1_M = 0.06  # of the path's curvature where a map only says "straight": radii beyond 10 m
+TRACK_S = 8.0  # length of the tracks that maps are compared with
+TRACKS = 12  # simulated for that, at most
 
 
-def fit_maps(dataset: DataSet, model: str = "complex") -> Calibration:
-    """Fit the robot's parameters to speed and turn rate of every row of maps.csv.
+def fit_maps(
+    dataset: DataSet, model: str = "complex", report: Callable[[str], None] | None = None
+) -> Calibration:
+    """Fit the robot's parameters to speed and path curvature of every row of maps.csv.
 
-    Sensitivities are central differences of the steady gait: two dozen orbits per row and iteration, each
-    accurate to 1e-4, over steps a hundred times that. The mean over replicates still carries the scatter of
-    friction and curvature from run to run; where the stated deviation is smaller, that is what counts.
+    Derivatives come from the steady gait's own solve. What scatters from run to run is friction and
+    curvature per pressure, as the model says, and what the stated deviations hold beyond that. The result
+    also says what tracks of the same gaits would have told.
 
     Raises
     ------
     NoAnswerError
         If no gait of the maps has a steady state.
     """
-    robot = dataset.robot
-    base = tuple(c for c in base_coordinates(robot) if c.name != FRICTION_SPEED)
-    rows = dataset.maps[:: max(1, math.ceil(len(dataset.maps) / MOST_ROWS))]
-    values = np.zeros(len(base))
-    precision = np.array([c.prior_sd**-2 for c in base])
-    first = None
-    for _ in range(ITERATIONS):
-        residual, slopes = _linearise(robot, base, values, rows, model)
-        first = residual if first is None else first
-        matrix = slopes.T @ slopes + np.diag(precision)
-        step = np.linalg.solve(matrix, slopes.T @ residual - precision * values)
-        values = values + np.clip(step, -0.2, 0.2)
-        if np.abs(step).max() < 1e-3:
-            break
-    residual, slopes = _linearise(robot, base, values, rows, model)
-    covariance = np.linalg.inv(slopes.T @ slopes + np.diag(precision))
-    point = Point({c.name: float(v) for c, v in zip(base, values)})
-    ratio = float(residual @ residual / max(residual.size, 1))
-    assert first is not None
-    found = Fit(base, point, covariance, float(residual @ residual), ratio, 1.0, {}, ITERATIONS, True)
-    return calibration(robot, found, math.sqrt(float(first @ first) / first.size), math.sqrt(ratio))
+    base = base_coordinates(dataset.robot)
+    found = fit(Maps(dataset, model, base), base, report=report, correlated=1.0)
+    before, after = math.sqrt(found.start_misfit_ratio), math.sqrt(found.misfit_ratio)
+    result = calibration(dataset.robot, found, before, after)
+    return replace(result, sd_with_tracks=_sd_with_tracks(dataset, model, base, Point(found.point.values)))
 
 
-def _robot(robot: Robot, base: tuple[Coordinate, ...], values: np.ndarray) -> Robot:
-    changes = {c.name: getattr(robot, c.name) * math.exp(v) for c, v in zip(base, values)}
-    return robot.with_values(**changes)
+class Maps:
+    """The rows of maps.csv, held against steady gaits.
+
+    Parameters
+    ----------
+    dataset : DataSet
+    model : {"complex", "simplified"}
+    base : sequence of Coordinate
+        Robot parameters.
+    """
+
+    def __init__(self, dataset: DataSet, model: str, base: Sequence[Coordinate]) -> None:
+        self.robot, self.model = dataset.robot, model
+        self.rows = dict(enumerate(dataset.maps))
+        bench = self._paths(start_point(base), base)
+        if not bench:
+            raise NoAnswerError("no gait of the maps has a steady state with this robot")
+        self.rows = {k: self.rows[k] for k in bench}
+        names = [c.name for c in base]
+        scattered = [names.index(n) for n in SCATTER_SD]
+        spread = {k: slopes[:, scattered] * list(SCATTER_SD.values()) for k, (_, slopes) in bench.items()}
+        own = _own_variance(self.rows, spread)
+        self._whitening = {k: np.linalg.inv(_root(row, spread[k], own)) for k, row in self.rows.items()}
+
+    def grams(
+        self, point: Point, coordinates: Sequence[Coordinate], trials: Sequence[Trial] | None = None
+    ) -> dict[str, TrialGram]:
+        """Return the normal equations of every row.
+
+        Raises
+        ------
+        NoAnswerError
+            If a gait that has a steady state with the bench values has none at `point`.
+        """
+        none = np.zeros(0)
+        found = {}
+        paths = self._paths(point, coordinates)
+        for k, row in self.rows.items():
+            if k not in paths:
+                raise NoAnswerError(f"row {k + 1} of the maps has no steady state with these parameters")
+            value, slopes = paths[k]
+            both = self._whitening[k] @ np.column_stack([slopes, _measured(row) - value])
+            found[f"map row {k + 1}"] = TrialGram(both.T @ both, 2, (), none, none)
+        return found
+
+    def _paths(
+        self, point: Point, coordinates: Sequence[Coordinate]
+    ) -> dict[int, tuple[np.ndarray, np.ndarray]]:
+        changes = {n: getattr(self.robot, n) * math.exp(v) for n, v in point.values.items()}
+        robot = self.robot.with_values(**changes)
+        gaits = [_wave(robot, row).gait() for row in self.rows.values()]
+        return {
+            k: path(robot, orbit, coordinates, self.model)
+            for k, orbit in zip(self.rows, steady_gaits(robot, gaits, self.model))
+            if not isinstance(orbit, NoAnswerError)
+        }
 
 
-def _linearise(
-    robot: Robot, base: tuple[Coordinate, ...], values: np.ndarray, rows: tuple[MapRow, ...], model: str
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return whitened residuals (2 rows,) and their slopes (2 rows, K)."""
-    here = _motions(_robot(robot, base, values), rows, model)
-    columns = []
-    for k in range(len(base)):
-        ends = []
-        for sign in (1, -1):
-            moved = values.copy()
-            moved[k] += sign * STEP
-            ends.append(_motions(_robot(robot, base, moved), rows, model))
-        columns.append((ends[0] - ends[1]) / (2 * STEP))
-    slopes = np.stack(columns, axis=2)  # (rows, 2, K)
-    residuals, whitened = [], []
-    for i, row in enumerate(rows):
-        if not np.isfinite(slopes[i]).all():
-            continue
-        residual, covariance = _row(row, here[i], slopes[i], base)
-        root = np.linalg.inv(np.linalg.cholesky(covariance))
-        residuals.append(root @ residual)
-        whitened.append(root @ slopes[i])
-    if not residuals:
-        raise NoAnswerError("no gait of the maps has a steady state with this robot")
-    return np.concatenate(residuals), np.concatenate(whitened)
+def path(robot: Robot, orbit: Orbit, base: Sequence[Coordinate], model: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return speed (m/s) and curvature (1/m, + left) of a gait's path, and their slopes (2, K)."""
+    forward = math.copysign(1.0, orbit.speed_m_s)
+    speed, turn = abs(orbit.speed_m_s), orbit.turn_rate_rad_s
+    by = sensitivity(robot, orbit, model).robot
+    slopes = np.empty((2, len(base)))
+    for k, coordinate in enumerate(base):
+        by_speed, by_turn = by[coordinate.name] * getattr(robot, coordinate.name)
+        slopes[:, k] = forward * by_speed, (by_turn - turn / speed * forward * by_speed) / speed
+    return np.array([speed, turn / speed]), slopes
 
 
-def _row(
-    row: MapRow, motion: np.ndarray, slopes: np.ndarray, base: tuple[Coordinate, ...]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return a row's residual (speed, turn rate) and covariance: its own and that of the runs' scatter."""
-    turn = 0.0 if row.radius_m is None else row.speed_m_s / row.radius_m
-    speed_sd = max(row.speed_sd_m_s, LEAST_SD_M_S) / math.sqrt(max(row.replicates, 1))
-    radius_part = 0.0 if not row.radius_m else (row.radius_sd_m or 0.0) / row.radius_m**2 * row.speed_m_s
-    turn_sd = math.hypot(radius_part, 0.02) / math.sqrt(max(row.replicates, 1))
-    names = [c.name for c in base]
-    scatter = np.zeros((2, 2))
-    for name, sd in SCATTER_SD.items():
-        if name in names:
-            slope = slopes[:, names.index(name)]
-            scatter += np.outer(slope, slope) * sd**2 / max(row.replicates, 1)
-    own = np.diag([speed_sd**2, turn_sd**2])
-    return np.array([row.speed_m_s, turn]) - motion, own + scatter
+def _wave(robot: Robot, row: MapRow) -> Wave:
+    return Wave.uniform(robot.segments, row.frequency_hz, row.pressure_kpa, row.phase_lag_rad, row.offset)
 
 
-def _motions(robot: Robot, rows: tuple[MapRow, ...], model: str) -> np.ndarray:
-    """Return speed and turn rate of every row's gait, (rows, 2); NaN where there is no steady state."""
-    found = np.full((len(rows), 2), np.nan)
-    for i, row in enumerate(rows):
-        wave = Wave.uniform(robot.segments, row.frequency_hz, row.pressure_kpa, row.phase_lag_rad, row.offset)
-        try:
-            orbit = steady_gait(robot, wave.gait(), model)
-        except NoAnswerError:
-            continue
-        found[i] = abs(orbit.speed_m_s), orbit.turn_rate_rad_s
-    return found
+def _measured(row: MapRow) -> np.ndarray:
+    return np.array([row.speed_m_s, 0.0 if row.radius_m is None else 1 / row.radius_m])
+
+
+def _own_variance(rows: Mapping[int, MapRow], spread: Mapping[int, np.ndarray]) -> np.ndarray:
+    """Return the variance (2,) of one run that the scatter of friction and curvature does not explain.
+
+    Pooled over all rows: from a few replicates alone a deviation is hardly known.
+    """
+    excess: list[list[float]] = [[], []]
+    for k, row in rows.items():
+        stated = (row.speed_sd_m_s, (row.radius_sd_m or 0.0) / row.radius_m**2 if row.radius_m else 0.0)
+        for i, sd in enumerate(stated):
+            if sd > 0:
+                excess[i].append(sd**2 - float(spread[k][i] @ spread[k][i]))
+    pooled = np.array([np.mean(e) if e else 0.0 for e in excess])
+    return np.asarray(np.maximum(pooled, LEAST_SD**2))
+
+
+def _root(row: MapRow, scatter: np.ndarray, own: np.ndarray) -> np.ndarray:
+    """Return the Cholesky factor of a row's covariance: that of one run over the number of replicates."""
+    covariance = (scatter @ scatter.T + np.diag(own)) / max(row.replicates, 1)
+    if row.radius_m is None:
+        covariance[1, 1] += STRAIGHT_SD_1_M**2
+    return np.asarray(np.linalg.cholesky(covariance))
+
+
+def _sd_with_tracks(
+    dataset: DataSet, model: str, base: Sequence[Coordinate], point: Point
+) -> dict[str, float]:
+    """Return the deviations that one track of every gait, as the data set's camera sees it, would leave."""
+    rows = dataset.maps[:: math.ceil(len(dataset.maps) / TRACKS)]
+    time_s = np.arange(round(TRACK_S * dataset.rate_hz)) / dataset.rate_hz
+    blank = np.zeros((time_s.size, dataset.robot.links, 2))
+    trials = [
+        Trial(
+            f"map row {k}", row.frequency_hz, row.pressure_kpa, row.offset, row.phase_lag_rad, 0.0, TRACK_S,
+            time_s, blank,
+        )
+        for k, row in enumerate(rows)
+    ]  # fmt: skip
+    experiment = Experiment(Model(dataset.robot, model), trials, dataset.marker_sd_m)
+    total = sum_eliminated(experiment.grams(point, base)) * (len(dataset.maps) / len(rows))
+    covariance = solve(total, range(len(base)), *priors(base, point)).covariance
+    values = {c.name: getattr(dataset.robot, c.name) * math.exp(point.values[c.name]) for c in base}
+    return {c.name: values[c.name] * float(s) for c, s in zip(base, np.sqrt(np.diag(covariance)))}

@@ -30,6 +30,8 @@ class Calibration:
         Directions about which the data say no more than the bench did.
     before, after : float
         Root mean square misfit over the noise, at the bench values and at the estimates.
+    sd_with_tracks : dict or None
+        For a calibration from maps alone: the deviations that tracks of the same gaits would leave.
     """
 
     robot: Robot
@@ -39,6 +41,7 @@ class Calibration:
     unidentifiable: tuple[str, ...]
     before: float
     after: float
+    sd_with_tracks: dict[str, float] | None = None
 
 
 def calibrated_robot(robot: Robot, fit: Fit) -> Robot:

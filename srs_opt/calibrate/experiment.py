@@ -1,0 +1,185 @@
+"""The trials of a data set held against the model: predictions, residuals, normal equations."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from srs_opt.calibrate.coordinates import SCATTER_SD, Coordinate
+from srs_opt.calibrate.gram import TrialGram, trial_gram
+from srs_opt.calibrate.instruments import NAME, reading_gram, readings
+from srs_opt.calibrate.model import Model
+from srs_opt.calibrate.noise import track_of
+from srs_opt.calibrate.nominal import Nodes, TrialRun, tolerance_for
+from srs_opt.calibrate.observe import Prediction, predict
+from srs_opt.errors import NoAnswerError
+from srs_opt.measurement.records import Bench, Trial
+from srs_opt.simulate.together import together
+
+if TYPE_CHECKING:
+    from srs_opt.calibrate.crew import Crew
+
+Extra = Callable[[Trial, Prediction], np.ndarray]
+
+
+@dataclass(frozen=True)
+class Point:
+    """Where a model stands: shared coordinates and every trial's scatter.
+
+    Attributes
+    ----------
+    values : dict
+        Coordinate -> value.
+    scatter : dict
+        Trial name -> array of log factors on friction along, across and curvature.
+    """
+
+    values: dict[str, float]
+    scatter: dict[str, np.ndarray] = field(default_factory=dict)
+
+    def of_trial(self, name: str) -> dict[str, float]:
+        """Return the values with the trial's own scatter added."""
+        own = dict(self.values)
+        for parameter, b in zip(SCATTER_SD, self.scatter.get(name, np.zeros(len(SCATTER_SD)))):
+            own[parameter] = own.get(parameter, 0.0) + float(b)
+        return own
+
+
+class Experiment:
+    """The trials of a data set and the model that is held against them.
+
+    Parameters
+    ----------
+    model : Model
+    trials : sequence of Trial
+    sd_m : float
+        Noise per coordinate.
+    bench : Bench, optional
+        Readings of other instruments to hold the model against too.
+    tolerance_m_s : float, optional
+        Of the simulation; default: what the trials' number of values asks for.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        trials: Sequence[Trial],
+        sd_m: float,
+        bench: Bench | None = None,
+        tolerance_m_s: float | None = None,
+    ) -> None:
+        self.model, self.trials, self.sd_m = model, tuple(trials), sd_m
+        self.readings = readings(model, bench) if bench is not None else ()
+        self.runs = {t.name: TrialRun(model, t) for t in self.trials}
+        self.tracks = {t.name: track_of(t) for t in self.trials}
+        count = sum(track.size for track in self.tracks.values() if track is not None)
+        self.tolerance_m_s = tolerance_m_s or tolerance_for(count, sd_m)
+        self.scatter_sd = np.array(list(SCATTER_SD.values()))
+        self.crew: Crew | None = None
+
+    def predict(
+        self,
+        trial: Trial,
+        point: Point,
+        coordinates: Sequence[Coordinate] = (),
+        tolerance_m_s: float | None = None,
+    ) -> Prediction:
+        """Return the prediction of one trial at `point`."""
+        nodes = self.runs[trial.name](point.of_trial(trial.name), tolerance_m_s or self.tolerance_m_s)
+        return self._seen(trial, nodes, point, coordinates)
+
+    def _seen(
+        self, trial: Trial, nodes: Nodes, point: Point, coordinates: Sequence[Coordinate]
+    ) -> Prediction:
+        values = point.of_trial(trial.name)
+        centre_only = trial.markers_m is None
+        return predict(self.model, trial, nodes, values, coordinates, centre_only=centre_only)
+
+    def residual(self, trial: Trial, prediction: Prediction) -> np.ndarray:
+        """Return measured minus predicted, (T, 2 M)."""
+        track = self.tracks[trial.name]
+        assert track is not None
+        return np.asarray(track - prediction.points)
+
+    def gram(
+        self,
+        trial: Trial,
+        point: Point,
+        coordinates: Sequence[Coordinate],
+        extra: Extra | None = None,
+    ) -> TrialGram:
+        """Return the trial's Gram matrix over `coordinates`, then the residual functions `extra`.
+
+        The coordinates must include the scattering parameters.
+        """
+        return self.own_grams((trial,), point, coordinates, extra)[trial.name]
+
+    def own_grams(
+        self,
+        trials: Sequence[Trial],
+        point: Point,
+        coordinates: Sequence[Coordinate],
+        extra: Extra | None = None,
+    ) -> dict[str, TrialGram]:
+        """Return the Gram matrices of `trials`, simulated side by side in this process."""
+        nodes = together(
+            [self.runs[t.name].search(point.of_trial(t.name), self.tolerance_m_s) for t in trials]
+        )
+        found = {}
+        for trial, run in zip(trials, nodes):
+            if isinstance(run, NoAnswerError):
+                raise run
+            found[trial.name] = self._gram(trial, run, point, coordinates, extra)
+        return found
+
+    def _gram(
+        self,
+        trial: Trial,
+        nodes: Nodes,
+        point: Point,
+        coordinates: Sequence[Coordinate],
+        extra: Extra | None,
+    ) -> TrialGram:
+        prediction = self._seen(trial, nodes, point, coordinates)
+        residual = self.residual(trial, prediction)
+        slopes = prediction.slopes.reshape(residual.size, -1)
+        if extra is not None:
+            slopes = np.column_stack([slopes, extra(trial, prediction).reshape(residual.size, -1)])
+        names = [c.name for c in coordinates]
+        scattered = [names.index(n) for n in SCATTER_SD]
+        now = point.scatter.get(trial.name, np.zeros(len(SCATTER_SD)))
+        gram = trial_gram(residual.ravel(), slopes, self.sd_m, scattered, self.scatter_sd, now)
+        return replace(gram, serial=serial_correlation(residual / self.sd_m))
+
+    def grams(
+        self,
+        point: Point,
+        coordinates: Sequence[Coordinate],
+        trials: Sequence[Trial] | None = None,
+        extra: Extra | None = None,
+    ) -> dict[str, TrialGram]:
+        """Return the Gram matrices of several trials."""
+        chosen = self.trials if trials is None else trials
+        if self.crew is not None:
+            found = self.crew.grams(chosen, point, coordinates, extra)
+        else:
+            found = self.own_grams(chosen, point, coordinates, extra)
+        if self.readings and found:
+            further = next(iter(found.values())).raw.shape[0] - 1 - len(coordinates)
+            found[NAME] = reading_gram(self.readings, point.values, coordinates, further)
+        return found
+
+
+def serial_correlation(residual: np.ndarray, lags: int = 8) -> float:
+    """Return the standardised sum of products of residuals (T, n) up to `lags` frames apart (NaN: lost)."""
+    total, count = 0.0, 0
+    for lag in range(1, min(lags, residual.shape[0] - 1) + 1):
+        products = residual[lag:] * residual[:-lag]
+        seen = np.isfinite(products)
+        total += float(products[seen].sum())
+        count += int(seen.sum())
+    return total / math.sqrt(count) if count else 0.0
