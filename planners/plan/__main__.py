@@ -113,7 +113,7 @@ def _explain(
     explanation = explain(problem)
     record["reason"] = explanation.in_words(result.reason)
     record["tightest"] = explanation.to_record()
-    return [save_obstruction_picture(options.out / "why_not.png", problem, explanation)]
+    return [*save_obstruction_picture(options.out / "why_not", problem, explanation)]
 
 
 def _drive(
@@ -142,7 +142,7 @@ def _pictures(
 
     assert result.plan is not None  # the caller has looked
     driven = None if execution is None else execution.pose[:, :2]
-    files = [save_plan_picture(options.out / "plan.png", problem, result.plan, driven)]
+    files = [*save_plan_picture(options.out / "plan", problem, result.plan, driven)]
     files.append(save_motion(options.out / "motion.json", problem, result.plan, execution))
     if options.animate:
         files.append(save_animation(options.animate, problem, result.plan, execution))

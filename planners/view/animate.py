@@ -46,7 +46,7 @@ def save_animation(path: Path, problem: Problem, plan: Plan, execution: Executio
     draw_maze(axes, problem.maze)
     axes.set_xlabel("")
     axes.set_ylabel("")
-    colors = gait_colors(tuple(plan.gaits) + (tuple(execution.gaits) if execution else ()))
+    colors = gait_colors(problem, (*plan.gaits, *(execution.gaits if execution else ())))
     body = Polygon(np.zeros((3, 2)), closed=True, edgecolor="#202020", linewidth=0.6, zorder=5)
     axes.add_patch(body)
     (trail,) = axes.plot([], [], color="#202020", linewidth=0.8, zorder=4)

@@ -7,25 +7,22 @@ from pathlib import Path
 from planners.maze.draw import draw_maze
 from planners.plan.explain import Explanation
 from planners.search.problem import Problem
-from srs_opt.figures import styled
-from srs_opt.files import atomic_path
+from srs_opt.figures import PAGE_IN, RIGHT, new_figure, save_figure, styled
 
-MARK = "#c0392b"
+MARK = RIGHT
 
 
 @styled
-def save_obstruction_picture(path: Path, problem: Problem, explanation: Explanation) -> Path:
-    """Write the picture (PNG): the maze, the widest route, a ring about the tightest place, a close-up."""
-    from matplotlib.figure import Figure
+def save_obstruction_picture(stem: Path, problem: Problem, explanation: Explanation) -> tuple[Path, Path]:
+    """Write the picture (PNG, SVG): maze, widest route, a ring about its tightest place, a close-up."""
     from matplotlib.patches import Circle
 
-    figure = Figure(figsize=(10, 4.5), layout="constrained")
-    whole, close = figure.subplots(1, 2, width_ratios=(2, 1))
+    figure, (whole, close) = new_figure(1, 2, width_in=PAGE_IN, height_in=2.8, width_ratios=(2, 1))
     for axes in (whole, close):
         draw_maze(axes, problem.maze)
     place = explanation.tightest
     if place is None:
-        whole.set_title("start and goal are not connected", fontsize=9)
+        whole.set_title("start and goal are not connected")
         close.set_visible(False)
     else:
         reach = max(3 * place.width_m, 0.5 * problem.robot.length_m)
@@ -41,9 +38,7 @@ def save_obstruction_picture(path: Path, problem: Problem, explanation: Explanat
             close.add_patch(ring)
         close.set_xlim(place.x_m - reach, place.x_m + reach)
         close.set_ylim(place.y_m - reach, place.y_m + reach)
-        whole.set_title(f"tightest place: {1e3 * place.width_m:.0f} mm", fontsize=9)
+        whole.set_title(f"tightest place: {1e3 * place.width_m:.0f} mm")
         name, width = explanation.needs[0]
-        close.set_title(f"dashed: {name} needs {1e3 * width:.0f} mm", fontsize=9)
-    with atomic_path(path) as temporary:
-        figure.savefig(temporary, dpi=130)
-    return path
+        close.set_title(f"dashed: {name} needs {1e3 * width:.0f} mm")
+    return save_figure(figure, stem)

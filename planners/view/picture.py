@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,23 +14,25 @@ from numpy.typing import NDArray
 from planners.maze.draw import draw_maze
 from planners.plan.answer import Plan
 from planners.search.problem import Problem
-from srs_opt.figures import styled
-from srs_opt.files import atomic_path
+from srs_opt.figures import PAGE_IN, RIGHT, SEQUENTIAL, save_figure, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 BODY_STEP_S = 0.04  # between the bodies whose union is the swept region
-PATH = "#202020"
+PATH, DRIVEN = "#202020", RIGHT
 
 
 @styled
-def save_plan_picture(path: Path, problem: Problem, plan: Plan, driven: NDArray[Any] | None = None) -> Path:
-    """Write the picture of a plan (PNG): maze with swept body above, clearance below.
+def save_plan_picture(
+    stem: Path, problem: Problem, plan: Plan, driven: NDArray[Any] | None = None
+) -> tuple[Path, Path]:
+    """Write the picture of a plan (PNG and SVG): maze with swept body above, clearance below.
 
     Parameters
     ----------
-    path : Path
+    stem : Path
+        Without ending.
     problem : Problem
     plan : Plan
     driven : array (n, 2), optional
@@ -38,34 +41,42 @@ def save_plan_picture(path: Path, problem: Problem, plan: Plan, driven: NDArray[
     from matplotlib.figure import Figure
 
     ratio = problem.maze.height_m / problem.maze.width_m
-    figure = Figure(figsize=(9, min(max(9 * ratio, 2.5), 12) + 2.6), layout="constrained")
+    height = min(max(0.75 * PAGE_IN * ratio, 1.6), 8) + 1.8
+    figure = Figure(figsize=(PAGE_IN, height), layout="constrained")
     above, below = figure.subplots(2, 1, height_ratios=(max(4 * ratio, 1.4), 1))
     draw_maze(above, problem.maze)
     colors = draw_swept(above, problem, plan)
     c = plan.certificate
     above.plot(c.pose[:, 0], c.pose[:, 1], color=PATH, linewidth=0.8, zorder=4, label="centre of mass")
     if driven is not None:
-        above.plot(driven[:, 0], driven[:, 1], "--", color="#c0392b", linewidth=1, zorder=5, label="driven")
-    above.legend(
-        loc="upper left",
-        bbox_to_anchor=(1.0, 1.0),
-        fontsize=7,
+        above.plot(driven[:, 0], driven[:, 1], "--", color=DRIVEN, linewidth=1, zorder=5, label="driven")
+    figure.legend(
+        *_sorted_handles(above, problem, colors),
+        loc="outside right upper",
         title=f"{problem.maze.name}: {plan.duration_s:.1f} s, {plan.length_m:.2f} m",
         title_fontsize=8,
     )
     draw_clearance(below, problem, plan, colors)
-    with atomic_path(path) as temporary:
-        figure.savefig(temporary, dpi=130)
-    return path
+    return save_figure(figure, stem)
 
 
-def gait_colors(gaits: tuple[int, ...]) -> dict[int, Any]:
-    """Return a colour for every gait used."""
+def gait_colors(problem: Problem, gaits: Iterable[int]) -> dict[int, Any]:
+    """Return a colour for every gait used, dark to light as they turn from left to right."""
     import matplotlib
 
-    used = list(dict.fromkeys(gaits))
-    palette = matplotlib.colormaps["tab20"]
-    return {gait: palette(k % 20) for k, gait in enumerate(used)}
+    turn = {gait: problem.gaits.gaits[gait].turn_rate_rad_s for gait in gaits}
+    ranked = sorted(turn, key=lambda gait: -turn[gait])
+    shades = np.linspace(0.0, 0.95, max(len(ranked), 2))
+    palette = matplotlib.colormaps[SEQUENTIAL]
+    return {gait: palette(shade) for gait, shade in zip(ranked, shades)}
+
+
+def _sorted_handles(axes: Axes, problem: Problem, colors: dict[int, Any]) -> tuple[list[Any], list[str]]:
+    """Return the legend's handles and labels: gaits from left to right turns, then the lines."""
+    order = [problem.gaits.gaits[gait].name for gait in colors]
+    pairs = list(zip(*axes.get_legend_handles_labels()))
+    pairs.sort(key=lambda pair: order.index(pair[1]) if pair[1] in order else len(order))
+    return [handle for handle, _ in pairs], [label for _, label in pairs]
 
 
 def draw_swept(axes: Axes, problem: Problem, plan: Plan) -> dict[int, Any]:
@@ -73,7 +84,7 @@ def draw_swept(axes: Axes, problem: Problem, plan: Plan) -> dict[int, Any]:
     from matplotlib.patches import PathPatch
     from matplotlib.path import Path as Outline
 
-    colors = gait_colors(plan.gaits)
+    colors = gait_colors(problem, plan.gaits)
     c = plan.certificate
     labelled: set[int] = set()
     first = 0
@@ -118,7 +129,7 @@ def draw_clearance(axes: Axes, problem: Problem, plan: Plan, colors: dict[int, A
         inside = (c.cycle >= first) & (c.cycle < first + count)
         first += count
         axes.plot(c.time_s[inside], room[inside], color=colors[gait], linewidth=1.2)
-    axes.axhline(1e3 * problem.margin_m, color="#c0392b", linewidth=0.8, linestyle="--")
+    axes.axhline(1e3 * problem.margin_m, color=DRIVEN, linewidth=0.8, linestyle="--")
     axes.set_ylim(bottom=0)
     axes.set_xlabel("time (s)")
     axes.set_ylabel("clearance (mm)")

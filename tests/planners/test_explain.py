@@ -27,7 +27,8 @@ def test_closed_wall_is_said(problem_in, tmp_path):
     assert explanation.tightest is None
     assert "completely" in explanation.in_words(None)
     assert explanation.to_record()["width_m"] is None
-    assert save_obstruction_picture(tmp_path / "why.png", problem, explanation).stat().st_size > 1000
+    for picture in save_obstruction_picture(tmp_path / "why", problem, explanation):
+        assert picture.stat().st_size > 1000
 
 
 def test_words_name_place_width_and_needs(problem_in, gaits, tmp_path):
@@ -36,7 +37,9 @@ def test_words_name_place_width_and_needs(problem_in, gaits, tmp_path):
     words = explanation.in_words("no way")
     assert "(1.0" in words or "(0.99" in words
     assert "0.045 m wide" in words and "slim" in words and "No gait at all" in words
-    assert save_obstruction_picture(tmp_path / "why.png", problem, explanation).exists()
+    assert all(
+        picture.exists() for picture in save_obstruction_picture(tmp_path / "why", problem, explanation)
+    )
 
 
 def test_weaker_gait_outside_the_table_is_tried(problem_in):
