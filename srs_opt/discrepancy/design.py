@@ -10,6 +10,7 @@ import numpy as np
 from srs_opt.calibrate.fit import Experiment, Point
 from srs_opt.calibrate.gram import bounded_solve
 from srs_opt.discrepancy.hypothesis import Hypothesis
+from srs_opt.discrepancy.select import Selection
 from srs_opt.errors import NoAnswerError
 from srs_opt.measurement.records import Schedule, Trial
 
@@ -51,6 +52,26 @@ INSTRUMENTS = (
     Instrument("a scale under the tail's wheels (tail_load_n)", 0.005, "tether_weight.load_n"),
     Instrument("a scale under the head's wheels (head_load_n)", 0.005, "head_mass.extra_kg"),
 )  # fmt: skip
+
+
+def rivals_of(selection: Selection, fitted: Sequence[Hypothesis]) -> tuple[Hypothesis, ...]:
+    """Return what an experiment should tell apart: the rivals, or, where nothing fits, the two best stories.
+
+    The stories are the best fits that put the fault into different stages of the model, so that the answer
+    says where to look.
+    """
+    from srs_opt.model.effects import all_effects
+
+    found = [selection.best, *selection.rivals]
+    if len(found) > 1 or not selection.best.candidates:
+        return tuple(found)
+
+    def stages(h: Hypothesis) -> set[str]:
+        return {all_effects()[c.effect].kind for c in h.candidates}
+
+    own = stages(selection.best)
+    others = [h for h in fitted if h.candidates and stages(h) != own]
+    return (selection.best, *sorted(others, key=lambda h: h.deviance)[:1])
 
 
 def next_experiment(

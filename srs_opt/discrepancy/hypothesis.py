@@ -57,6 +57,11 @@ class Hypothesis:
         values = [self.fit.point.values[c.name] / c.typical for c in candidate.sizes]
         return float(np.linalg.norm(values))
 
+    def firmness(self, candidate: Candidate) -> float:
+        """Return how many standard deviations an effect's fitted size lies from zero."""
+        sd = self.fit.sd
+        return max(abs(self.fit.point.values[c.name]) / max(sd[c.name], 1e-300) for c in candidate.sizes)
+
     def implausible(self) -> str:
         """Return what physics or the bench has against the fitted values; empty when nothing."""
         for candidate in self.candidates:

@@ -72,10 +72,10 @@ def misfit_by_trial(examined: Examined) -> dict[str, float]:
 
 
 def odd_trials(examined: Examined) -> tuple[str, ...]:
-    """Return the trials that contradict the others: a misfit several times that of most."""
+    """Return the few trials whose misfit is several times that of most, worst first."""
     misfit = {n: m for n, m in misfit_by_trial(examined).items() if examined.linearisation.grams[n].scattered}
     usual = sorted(misfit.values())[len(misfit) // 2]
-    odd = [n for n, m in misfit.items() if m > ODD * usual and m > 1.2]
+    odd = sorted((n for n, m in misfit.items() if m > ODD * usual and m > 1.2), key=lambda n: -misfit[n])
     return tuple(odd) if len(odd) <= len(misfit) // 4 else ()
 
 

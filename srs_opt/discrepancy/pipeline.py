@@ -12,14 +12,14 @@ from srs_opt.calibrate.crew import Crew
 from srs_opt.calibrate.fit import Experiment, start_point
 from srs_opt.calibrate.model import Model
 from srs_opt.calibrate.noise import noise_sd_m
-from srs_opt.discrepancy.design import NextExperiment, next_experiment
+from srs_opt.discrepancy.design import NextExperiment, next_experiment, rivals_of
 from srs_opt.discrepancy.hypothesis import Hypothesis
-from srs_opt.discrepancy.locate import Place, locate
+from srs_opt.discrepancy.locate import Place, locate, odd_trials
 from srs_opt.discrepancy.screen import Score
 from srs_opt.discrepancy.seal import Gap, open_seal
 from srs_opt.discrepancy.search import Examined, Search
 from srs_opt.discrepancy.select import Selection, select
-from srs_opt.discrepancy.split import Split, split_trials
+from srs_opt.discrepancy.split import LEAST_OPEN, Split, split_trials
 from srs_opt.discrepancy.verdict import DETECTED, NO_GAP, NOT_TESTABLE, ONE_OF, UNKNOWN, Verdict, judge
 from srs_opt.measurement.records import DataSet
 
@@ -117,14 +117,16 @@ def _examine(
         return _not_testable(dataset, split, experiment.sd_m, started, why)
     tell(f"screening {len(candidates)} candidates")
     null = search.examine(first)
-    best, fitted = search.run(null) if null.detection.p_value < DETECTED else (null, [first])
+    at_odds = contradicting(search, null) if null.detection.p_value < DETECTED else ()
+    searched = null.detection.p_value < DETECTED and not at_odds
+    best, fitted = search.run(null) if searched else (null, [first])
     selection = select(best.hypothesis, fitted, split)
     tell("opening the sealed trials")
     gap = open_seal(experiment, first.fit, best.hypothesis.fit, split.sealed, seed)
-    verdict = judge(null, best, selection, gap)
+    verdict = judge(null, best, selection, gap, at_odds)
     following = None
-    if verdict.word in (ONE_OF, UNKNOWN):
-        following = next_experiment(experiment, [selection.best, *selection.rivals], split.open)
+    if verdict.word in (ONE_OF, UNKNOWN) and not at_odds:
+        following = next_experiment(experiment, rivals_of(selection, fitted), split.open)
     return Discrepancy(
         dataset,
         verdict,
@@ -142,6 +144,20 @@ def _examine(
         tuple(fitted),
         frozenset(search.tried),
     )
+
+
+def contradicting(search: Search, null: Examined) -> tuple[str, ...]:
+    """Return the few trials, if any, without which calibration alone explains all the others."""
+    odd = odd_trials(null)
+    for count in range(1, len(odd) + 1):
+        rest = [t for t in search.trials if t.name not in odd[:count]]
+        if len(rest) < LEAST_OPEN:
+            break
+        without = Search(search.experiment, search.base, search.candidates, rest, search.seed)
+        found = without.fit((), null.hypothesis.fit.point, NULL_ITERATIONS)
+        if found is not None and without.examine(found).detection.p_value >= DETECTED:
+            return odd[:count]
+    return ()
 
 
 def _candidates(dataset: DataSet, effects: Sequence[str] | None) -> tuple[Candidate, ...]:

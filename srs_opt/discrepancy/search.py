@@ -21,11 +21,16 @@ from srs_opt.measurement.records import Trial
 DEEPEST, ROUNDS = 4, 6  # effects at once; additions or exchanges in all
 ADEQUATE = 0.01  # level at which a fitted model is rejected
 FALSE_NAME = 0.002  # family-wise level for adding an effect
-RIVAL = 12.0  # deviance within which two sets of effects cannot be told apart
+# Deviance within which two sets of effects cannot be told apart. The truth falls behind a rival by D with
+# probability Phi(-sqrt(D)) at worst, whatever separates the two: under 1 % here, so that the sets that are
+# kept hold the truth at 95 % with several rivals.
+RIVAL = 6.0
 _CONTENDER = 0.45  # share of the best expected gain that earns a refit
 _NEAR = 40.0  # or this little behind it
 _MOST_REFITS = (5, 4, 3, 3)
-QUICK = 9  # trials that refits are tried on before all are asked
+QUICK, QUICK_ITERATIONS = 9, 8  # trials and iterations that refits are tried with before all are asked
+LEFT = 0.6  # share of the misfit that a second or later effect may leave and still count as progress
+FIRM = 10.0  # standard deviations from zero at which an effect is not superfluous, without a refit
 
 # effects that act much alike: a member that is well behind in the screen is refitted all the same
 LOOK_ALIKES = (
@@ -176,8 +181,8 @@ class Search:
             better = self._swapped(current, better)
             if better is None or not self._worth(better, current.hypothesis):
                 break
-            current = self._pruned(self.examine(better))
-            if current.adequate:
+            before, current = current, self._pruned(self.examine(better))
+            if current.adequate or _stuck(before.hypothesis, current.hypothesis):
                 break
         return current, self.fitted
 
@@ -224,7 +229,9 @@ class Search:
         for score in proposals[: 2 * most]:
             start = expected_start(current.linearisation, score)
             beat = min((h.deviance for h in found), default=math.inf)
-            hypothesis = self.fit((*have, score.candidate), start, beat=beat, trials=self.quick)
+            hypothesis = self.fit(
+                (*have, score.candidate), start, QUICK_ITERATIONS, beat=beat, trials=self.quick
+            )
             if hypothesis is not None:
                 found.append(hypothesis)
             settled = found and min(h.fit.misfit_ratio for h in found) < 1.02
@@ -252,6 +259,8 @@ class Search:
             smaller = self.fit(rest, current.hypothesis.fit.point)
             return current if smaller is None else self._pruned(self.examine(smaller))
         for dropped in have[:-1]:
+            if current.hypothesis.firmness(dropped) > FIRM:
+                continue
             rest = tuple(c for c in have if c is not dropped)
             allowed = needed_gain(dropped, len(self.candidates))
             beat = current.hypothesis.deviance + allowed
@@ -259,6 +268,12 @@ class Search:
             if smaller is not None and smaller.deviance < beat:
                 return self._pruned(self.examine(smaller))
         return current
+
+
+def _stuck(before: Hypothesis, after: Hypothesis) -> bool:
+    """Whether piling up effects only nibbles at the misfit: what is missing is none of them."""
+    left = (after.fit.misfit_ratio - 1) / max(before.fit.misfit_ratio - 1, 1e-9)
+    return len(after.candidates) > 1 and after.fit.misfit_ratio > 1.2 and left > LEFT
 
 
 def _cost(hypothesis: Hypothesis) -> float:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from srs_opt.discrepancy.locate import odd_trials
 from srs_opt.discrepancy.seal import Gap
 from srs_opt.discrepancy.search import ADEQUATE, Examined
 from srs_opt.discrepancy.select import Selection
@@ -21,23 +21,35 @@ class Verdict:
     why: str
 
 
-def judge(null: Examined, best: Examined, selection: Selection | None, gap: Gap | None) -> Verdict:
-    """Return the verdict; every doubt counts against a name."""
+def judge(
+    null: Examined,
+    best: Examined,
+    selection: Selection | None,
+    gap: Gap | None,
+    at_odds: Sequence[str] = (),
+) -> Verdict:
+    """Return the verdict; every doubt counts against a name.
+
+    Parameters
+    ----------
+    at_odds : sequence of str
+        Trials without which calibration alone explains the others.
+    """
     p = null.detection.p_value
     if p >= DETECTED:
         return Verdict(
             NO_GAP, f"calibration alone explains the data (p = {p:.2g}); nothing is missing that they show"
         )
-    if selection is None or not selection.best.candidates:
-        odd = odd_trials(null)
-        what = f"trial {', '.join(odd)} contradicts the others" if odd else "no known effect explains it"
-        return Verdict(UNKNOWN, f"there is a gap (p = {p:.2g}), but {what}")
-    label = " + ".join(selection.best.names)
-    odd = odd_trials(best)
-    if not best.adequate and odd:
-        return Verdict(
-            UNKNOWN, f"even with {label}, trial {', '.join(odd)} contradicts the others: look at it first"
+    if at_odds:
+        who = (
+            f"trial {at_odds[0]} contradicts"
+            if len(at_odds) == 1
+            else f"trials {', '.join(at_odds)} contradict"
         )
+        return Verdict(UNKNOWN, f"{who} the others, which calibration alone explains: look there first")
+    if selection is None or not selection.best.candidates:
+        return Verdict(UNKNOWN, f"there is a gap (p = {p:.2g}), but no known effect explains it")
+    label = " + ".join(selection.best.names)
     if not best.adequate:
         left = best.detection.p_value
         return Verdict(

@@ -87,6 +87,22 @@ def test_a_late_valve_cannot_be_told_from_an_early_clock(tmp_path, capsys):
     assert said["effects"][0]["name"] == "dead_time"
 
 
+@pytest.mark.slow
+def test_a_mislabelled_trial_is_pointed_out_and_names_nothing(tmp_path, capsys):
+    folder, _ = lab(tmp_path / "set")
+    table = (folder / "trials.csv").read_text().splitlines()
+    header = table[0].split(",")
+    rows = [dict(zip(header, line.split(","))) for line in table[1:]]
+    wrong = rows[4]
+    wrong["pressure_kpa"] = "41.0" if float(wrong["pressure_kpa"]) > 45 else "55.0"
+    lines = [table[0], *(",".join(row[k] for k in header) for row in rows)]
+    (folder / "trials.csv").write_text("\n".join(lines) + "\n")
+    _, said = ask(discrepancy, folder, capsys, "--seed", "1", out=tmp_path / "out2")
+    assert said["verdict"] == "unknown"
+    assert wrong["trial"] in said["why"] and "contradicts" in said["why"]
+    assert said["effects"] == []
+
+
 def test_one_trial_is_not_testable(tmp_path, capsys):
     folder, _ = lab(tmp_path / "set", trials=1, seconds=1.0)
     status, said = ask(discrepancy, folder, capsys, out=tmp_path / "out")
