@@ -10,6 +10,7 @@ import difflib
 import json
 import math
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import lru_cache
 from importlib import resources
@@ -24,6 +25,7 @@ from srs_opt.files import read_text
 
 Place = tuple[str | int, ...]
 MAX_VALUES, MAX_DEPTH = 1_000_000, 50
+MOST_VIOLATIONS = 1000  # looked for: a long list may be wrong all over
 _TAGS = {f"tag:yaml.org,2002:{kind}" for kind in ("null", "bool", "int", "float", "str", "seq", "map")}
 
 
@@ -189,24 +191,30 @@ def validate(document: Document, schema: dict[str, Any]) -> None:
     InputError
         For the most telling violation: file, line, key, what was found and what was expected.
     """
+    found = violations(document, schema)
+    if found:
+        raise found[0]
+
+
+def violations(document: Document, schema: dict[str, Any]) -> list[InputError]:
+    """Return everything in `document` that breaks `schema`, the most telling first."""
     import jsonschema
 
-    bad = _first_not_finite(document.value, ())
-    if bad is not None:
-        raise document.error(bad, "must be a finite number")
+    bad = list(islice(_not_finite(document.value, ()), MOST_VIOLATIONS))
+    found = [document.error(place, "must be a finite number") for place in bad]
     validator = jsonschema.Draft202012Validator(schema)
-    errors = list(islice(validator.iter_errors(document.value), 1000))  # a long list may be wrong all over
-    if not errors:
-        return
-    error = min(errors, key=lambda e: (e.validator != "additionalProperties", len(e.absolute_path)))
-    if error.context:  # anyOf / oneOf: the branch that got furthest tells most
-        error = jsonschema.exceptions.best_match([error]) or error
-    place: Place = tuple(error.absolute_path)
-    if error.validator == "additionalProperties":
-        known = sorted(error.schema.get("properties", {}))
-        unknown = next(k for k in error.instance if k not in known)
-        raise document.error((*place, str(unknown)), unknown_word("key", str(unknown), known))
-    raise document.error(place, _plain(error))
+    errors = list(islice(validator.iter_errors(document.value), MOST_VIOLATIONS))
+    for error in sorted(errors, key=lambda e: (e.validator != "additionalProperties", len(e.absolute_path))):
+        if error.context:  # anyOf / oneOf: the branch that got furthest tells most
+            error = jsonschema.exceptions.best_match([error]) or error
+        place: Place = tuple(error.absolute_path)
+        if error.validator == "additionalProperties":
+            known = sorted(error.schema.get("properties", {}))
+            unknown = [str(k) for k in error.instance if k not in known]
+            found += [document.error((*place, k), unknown_word("key", k, known)) for k in unknown]
+        elif place not in bad:
+            found.append(document.error(place, _plain(error)))
+    return found
 
 
 def unknown_word(kind: str, word: str, known: list[str]) -> str:
@@ -216,19 +224,16 @@ def unknown_word(kind: str, word: str, known: list[str]) -> str:
     return f"unknown {kind} '{word[:60]}' ({hint})"
 
 
-def _first_not_finite(value: Any, place: Place) -> Place | None:
+def _not_finite(value: Any, place: Place) -> Iterator[Place]:
     if isinstance(value, float) and not math.isfinite(value):
-        return place
+        yield place
     children: list[tuple[str | int, Any]] = []
     if isinstance(value, dict):
         children = list(value.items())
     elif isinstance(value, list):
         children = list(enumerate(value))
     for key, child in children:
-        found = _first_not_finite(child, (*place, key))
-        if found is not None:
-            return found
-    return None
+        yield from _not_finite(child, (*place, key))
 
 
 _TYPES = {
@@ -240,6 +245,18 @@ _TYPES = {
     "boolean": "true or false",
     "null": "nothing",
 }
+
+
+_THOUSANDTHS = {"m": "millimetres", "kg": "grams", "s": "milliseconds"}
+
+
+def _thousandths(error: Any) -> str:
+    """Return a hint where a value a thousand times smaller would do and its key names a unit."""
+    if error.validator != "maximum" or not error.absolute_path:
+        return ""
+    unit = str(error.absolute_path[-1]).rsplit("_", 1)[-1]
+    fits = error.instance / 1000 <= error.validator_value
+    return f" (in {_THOUSANDTHS[unit]}?)" if fits and unit in _THOUSANDTHS else ""
 
 
 def _plain(error: Any) -> str:
@@ -255,7 +272,7 @@ def _plain(error: Any) -> str:
         return f"key '{missing}' is missing"
     words = {
         "minimum": f"must be at least {limit}",
-        "maximum": f"must be at most {limit}",
+        "maximum": f"must be at most {limit}{_thousandths(error)}",
         "exclusiveMinimum": f"must be greater than {limit}",
         "exclusiveMaximum": f"must be less than {limit}",
         "enum": f"must be one of {', '.join(map(str, limit)) if isinstance(limit, list) else limit}",

@@ -18,7 +18,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from srs_opt.document import Document, load_schema, parse_yaml, read_yaml, validate
+from srs_opt.document import Document, load_schema, parse_yaml, read_yaml, validate, violations
 from srs_opt.errors import InputError
 
 EffectSpec = Mapping[str, Any]
@@ -149,11 +149,9 @@ def robot_from_document(document: Document) -> Robot:
     """
     validate(document, load_schema("srs_opt.robots", "robot.schema.json"))
     record = dict(document.value)
-    parameters = {f.name for f in dataclasses.fields(Robot)} - {"name", "effects", "relative_sd", "sources"}
-    for table in ("relative_sd", "sources"):
-        for key in record.get(table, {}):
-            if key not in parameters:
-                raise document.error((table, key), "is not a parameter of the robot")
+    misplaced = _misplaced(document)
+    if misplaced:
+        raise misplaced[0]
     if "effects" in record:
         from srs_opt.model.effects import check_effects
 
@@ -170,6 +168,48 @@ def robot_from_document(document: Document) -> Robot:
             "wheels slide across more easily than they roll?",
         )
     return robot
+
+
+def robot_problems(document: Document) -> list[InputError]:
+    """Return everything that is wrong with a parsed robot file, where `robot_from_document` stops at one."""
+    found = violations(document, load_schema("srs_opt.robots", "robot.schema.json"))
+    found += _misplaced(document)
+    if isinstance(document.value, dict):
+        found += _effect_problems(document, document.value.get("effects"), document.value.get("links", 5))
+    if not found:
+        try:
+            robot_from_document(document)
+        except InputError as error:
+            found.append(error)
+    return found
+
+
+def _misplaced(document: Document) -> list[InputError]:
+    """Return what the tables about parameters say of things that are none."""
+    parameters = {f.name for f in dataclasses.fields(Robot)} - {"name", "effects", "relative_sd", "sources"}
+    record = document.value if isinstance(document.value, dict) else {}
+    tables = {name: record.get(name) for name in ("relative_sd", "sources")}
+    return [
+        document.error((name, key), "is not a parameter of the robot")
+        for name, table in tables.items()
+        if isinstance(table, dict)
+        for key in table
+        if key not in parameters
+    ]
+
+
+def _effect_problems(document: Document, entries: Any, links: Any) -> list[InputError]:
+    """Return what is wrong with the single effects; entries without a name are the schema's business."""
+    from srs_opt.model.effects import check_effect
+
+    found = []
+    for index, entry in enumerate(entries if isinstance(entries, list) else ()):
+        if isinstance(entry, dict) and isinstance(entry.get("name"), str):
+            try:
+                check_effect(document, index, entry, links if isinstance(links, int) else MAX_LINKS)
+            except InputError as error:
+                found.append(error)
+    return found
 
 
 def _check_body(document: Document, robot: Robot) -> None:
@@ -220,4 +260,12 @@ def save_robot(robot: Robot, path: Path | str) -> Path:
     return write_text(path, yaml.safe_dump(record, sort_keys=False, width=100))
 
 
-__all__ = ["InputError", "Robot", "load_robot", "robot_from_document", "save_robot", "wpi_srs"]
+__all__ = [
+    "InputError",
+    "Robot",
+    "load_robot",
+    "robot_from_document",
+    "robot_problems",
+    "save_robot",
+    "wpi_srs",
+]

@@ -15,7 +15,7 @@ def build_parser() -> Parser:
         "python -m srs_opt.measurement",
         "Check a measured data set and say what it holds: every problem with file and line.\n"
         "Units: m, s, kPa, Hz, rad. Exit status 2 when the set has errors (warnings alone: 0).",
-        "python -m srs_opt.measurement measured/set-a --json",
+        "python -m srs_opt.measurement data/my_set --json",
         robot=False,
     )
     parser.add_argument(

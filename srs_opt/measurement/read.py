@@ -23,7 +23,7 @@ from srs_opt.measurement.records import (
 )
 from srs_opt.measurement.table import Row, read_rows, safe_name
 from srs_opt.measurement.tracks import check_track, read_track
-from srs_opt.robot import Robot, load_robot, wpi_srs
+from srs_opt.robot import Robot, robot_from_document, robot_problems, wpi_srs
 
 TRIAL_COLUMNS = (
     "trial",
@@ -134,10 +134,15 @@ def _read_robot(folder: Path, name: str, fields: _Fields, report: Report) -> Rob
         fields.error(("robot",), f"'{name[:60]}' {reason}")
         return wpi_srs()
     try:
-        robot = load_robot(folder / name)
+        document = read_yaml(folder / name, "a robot file (YAML)")
+        problems = robot_problems(document)
     except InputError as error:
-        report.add_input_error(name, error)
+        problems = [error]
+    for problem in problems:
+        report.add_input_error(name, problem)
+    if problems:
         return wpi_srs()
+    robot = robot_from_document(document)
     check_robot(robot, name, report)
     return robot
 

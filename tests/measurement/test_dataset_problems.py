@@ -47,6 +47,32 @@ def test_all_at_once(folder):
         load_dataset(folder)
 
 
+def test_everything_in_the_robot_file(folder):
+    (folder / "robot.yaml").write_text(
+        "lenght: 1\nsegment_length_m: 37\ntau1_s: soon\ngap_length_m: .inf\n"
+        "relative_sd: {tau3_s: 0.1, tau1_s: -1}\nsources: {tau1_s: guessed}\n"
+        "effects:\n  - {name: tether_drga, force_n: 1}\n  - {name: tether_drag}\n  - {force_n: 1}\n"
+    )
+    listed = [line for line in found(folder) if line.startswith("robot.yaml")]
+    for line, words in (
+        (1, "unknown key 'lenght'"),
+        (2, "segment_length_m: must be at most 2 (in millimetres?), found 37"),
+        (3, "tau1_s: expected a number"),
+        (4, "gap_length_m: must be a finite number"),
+        (5, "relative_sd.tau3_s: is not a parameter"),
+        (5, "relative_sd.tau1_s: must be at least 0"),
+        (6, "sources.tau1_s: must be one of"),
+        (8, "did you mean 'tether_drag'"),
+        (9, "needs 'force_n'"),
+        (10, "'name' is missing"),
+    ):
+        assert any(text.startswith(f"robot.yaml:{line}: ") and words in text for text in listed), (
+            words,
+            listed,
+        )
+    assert len(listed) == 10
+
+
 def test_clock_that_jumps(folder):
     time, points = gait_track()
     time[100:] += 0.5

@@ -74,34 +74,35 @@ def check_effects(
     """
     checked: list[Mapping[str, Any]] = []
     seen: set[tuple[Any, ...]] = set()
-    if not entries:
-        return ()
     for index, entry in enumerate(entries):
-        place: Place = ("effects", index)
-        effect = all_effects().get(entry["name"])
-        if effect is None:
-            raise document.error(
-                (*place, "name"), unknown_word("effect", entry["name"], sorted(all_effects()))
-            )
-        known = {p.name: p for p in effect.parameters}
-        for key in entry:
-            if key != "name" and key not in known:
-                raise document.error((*place, key), unknown_word("key", str(key), ["name", *known]))
-        if effect.size.name not in entry:
-            raise document.error(
-                place, f"effect '{effect.name}' needs '{effect.size.name}' ({effect.size.unit})"
-            )
-        values: dict[str, Any] = {"name": effect.name}
-        for parameter in effect.parameters:
-            value = entry.get(parameter.name, _default(parameter))
-            _check_value(document, (*place, parameter.name), parameter, value, links)
-            values[parameter.name] = int(value) if parameter.place else float(value)
-        identity = (effect.name, *(values[p.name] for p in effect.parameters if p.place))
+        values = check_effect(document, index, entry, links)
+        places = [p.name for p in all_effects()[entry["name"]].parameters if p.place]
+        identity = (entry["name"], *(values[name] for name in places))
         if identity in seen:
-            raise document.error(place, f"effect '{effect.name}' is listed twice")
+            raise document.error(("effects", index), f"effect '{entry['name']}' is listed twice")
         seen.add(identity)
-        checked.append(MappingProxyType(values))
+        checked.append(values)
     return tuple(checked)
+
+
+def check_effect(document: Document, index: int, entry: dict[str, Any], links: int) -> Mapping[str, Any]:
+    """Validate one entry of the list as `check_effects` does, whatever the others say."""
+    place: Place = ("effects", index)
+    effect = all_effects().get(entry["name"])
+    if effect is None:
+        raise document.error((*place, "name"), unknown_word("effect", entry["name"], sorted(all_effects())))
+    known = {p.name: p for p in effect.parameters}
+    for key in entry:
+        if key != "name" and key not in known:
+            raise document.error((*place, key), unknown_word("key", str(key), ["name", *known]))
+    if effect.size.name not in entry:
+        raise document.error(place, f"effect '{effect.name}' needs '{effect.size.name}' ({effect.size.unit})")
+    values: dict[str, Any] = {"name": effect.name}
+    for parameter in effect.parameters:
+        value = entry.get(parameter.name, _default(parameter))
+        _check_value(document, (*place, parameter.name), parameter, value, links)
+        values[parameter.name] = int(value) if parameter.place else float(value)
+    return MappingProxyType(values)
 
 
 def _default(parameter: EffectParameter) -> float:
