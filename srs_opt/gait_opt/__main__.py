@@ -175,10 +175,15 @@ def _run_table(options: argparse.Namespace) -> Answer:
     begun = time.perf_counter()
     limits = limits_from(options)
     unfinished = options.out / "table.unfinished"  # an interrupted table goes on from here
-    table = build_table(
-        robot, options.model, limits, lambda text: say(options, text),
-        jobs=options.jobs, cluster=options.cluster, resume=unfinished,
-    )  # fmt: skip
+    try:
+        table = build_table(
+            robot, options.model, limits, lambda text: say(options, text),
+            jobs=options.jobs, cluster=options.cluster, resume=unfinished,
+        )  # fmt: skip
+    except KeyboardInterrupt:
+        kept = len(list(unfinished.glob("*.json")))
+        say(options, f"\n{kept} optimizations are kept in {unfinished}; the same command goes on from there")
+        raise
     seconds = time.perf_counter() - begun
     files = [
         save_table(table, options.out / "gait_table.json"),

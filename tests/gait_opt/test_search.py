@@ -2,6 +2,9 @@
 
 import json
 import math
+import os
+import signal
+import threading
 
 import numpy as np
 import pytest
@@ -13,6 +16,7 @@ from srs_opt.gait_opt.aim import aimed, end_for_end, evened, in_step, leaned, on
 from srs_opt.gait_opt.certificate import certify, periodicity_gap, self_clearance_m
 from srs_opt.gait_opt.collocation.problem import CycleProblem
 from srs_opt.gait_opt.goal import Goal, Limits, air_work_j, chamber_volume_m3
+from srs_opt.gait_opt.ladder import Rung, climb
 from srs_opt.gait_opt.report import wave_parameters
 from srs_opt.gait_opt.search import search
 from srs_opt.orbit.steady import integrator, steady_gait
@@ -132,6 +136,23 @@ def test_interrupted_search_keeps_the_best():
     found = search(CycleProblem((ROBOT,), "complex", Goal(), Limits()), starts=2, say=say)
     assert found.interrupted
     assert found.orbits[0].speed_m_s > 0.23
+
+
+def test_an_interrupt_inside_the_solver_is_not_lost():
+    """IPOPT takes Ctrl-C for a failed evaluation; it must come out all the same."""
+    timer = threading.Timer(0.05, lambda: os.kill(os.getpid(), signal.SIGINT))
+    problem = CycleProblem((ROBOT,), "complex", Goal(), Limits())
+    start = published_wave(ROBOT, 2.0, 50.0).gait()
+
+    def work():
+        for k in range(20):  # the first round compiles
+            climb(problem, start, (Rung(0.03, 40, 0.1, 4),))
+            if k == 0:
+                timer.start()
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    timer.join()
 
 
 def test_certificate_finds_faults():

@@ -215,10 +215,12 @@ def test_ctrl_c_leaves_nothing_half_written(name, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["gait_opt", "discrepancy"])
+@pytest.mark.parametrize("name", ["gait_opt", "table", "discrepancy"])
 def test_ctrl_c_in_long_work(name, tmp_path):
     """Work in several processes ends as one; gait_opt may answer with the best gait so far."""
     arguments = ["srs_opt.gait_opt", "--starts", "8"]
+    if name == "table":
+        arguments = ["srs_opt.gait_opt", "--table", "--jobs", "2"]
     if name == "discrepancy":
         run(["virtual_lab", "--effect", "stribeck", "--quiet", "--out", str(tmp_path / "set")])
         arguments = ["srs_opt.discrepancy", str(tmp_path / "set"), "--jobs", "2"]
@@ -226,6 +228,9 @@ def test_ctrl_c_in_long_work(name, tmp_path):
     assert done.returncode in ((0, 1, 130) if name == "gait_opt" else (130,)), done.stderr
     assert "Traceback" not in done.stderr
     assert not left_behind(tmp_path)
+    if name == "table":
+        assert "goes on from there" in done.stderr
+        assert not list(tmp_path.rglob("gait_table*"))
 
 
 @pytest.mark.parametrize("arguments", [SIMULATE, MAP, GENERATE], ids=lambda a: a[0])

@@ -22,6 +22,7 @@ from srs_opt.gait_opt.collocation.layout import (
 from srs_opt.gait_opt.collocation.point import PointKind, point_functions
 from srs_opt.gait_opt.collocation.sparse import Gather, hessian_gather, jacobian_gather, to_dm
 from srs_opt.model.registry import build
+from srs_opt.processes import interrupt_not_lost
 
 GOAL_NUMBERS = ("min_dwell_s", "radius_m", "envelope_m", "chamber_volume_m3", "weight_n")
 
@@ -267,10 +268,9 @@ class Program:
             }  # fmt: skip
             arguments |= {"lam_g0": warm.multipliers_g, "lam_x0": warm.multipliers_z}
         solver = self._solver(**changes)
-        out = solver(**arguments)
+        with interrupt_not_lost():
+            out = solver(**arguments)
         stats = solver.stats()
-        if stats["return_status"] == "User_Requested_Stop":
-            raise KeyboardInterrupt  # IPOPT takes Ctrl-C for itself
         return Solution(
             np.asarray(out["x"]).ravel(),
             np.asarray(out["lam_g"]).ravel(),
