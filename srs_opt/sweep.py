@@ -13,11 +13,14 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from srs_opt.errors import InputError
 from srs_opt.files import write_text
 from srs_opt.processes import workers_deaf_to_interrupts
+
+if TYPE_CHECKING:
+    from distributed import Client
 
 CONNECT_S = 10.0  # patience with a scheduler that does not answer
 
@@ -143,15 +146,25 @@ def _backend(jobs: int, cluster: str | None) -> Iterator[Any]:
         with joblib.parallel_config("loky", n_jobs=jobs, inner_max_num_threads=1):
             yield
         return
+    with connect(cluster), joblib.parallel_config("dask"):
+        yield
+
+
+def connect(cluster: str) -> Client:
+    """Return a client of the Dask scheduler at `cluster`, ``host:port``; a context manager.
+
+    Raises
+    ------
+    InputError
+        If the package is missing or nobody answers there.
+    """
     try:
         from distributed import Client
     except ImportError as error:
         raise InputError("--cluster needs the package 'distributed': pip install srs-opt[cluster]") from error
     try:
-        client = Client(cluster, timeout=CONNECT_S)
+        return Client(cluster, timeout=CONNECT_S)
     except (OSError, ValueError, TimeoutError) as error:
         raise InputError(
             f"--cluster {cluster}: no Dask scheduler answers there (expected host:port)"
         ) from error
-    with client, joblib.parallel_config("dask"):
-        yield

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from srs_opt.command import Answer, Parser, make_parser, positive_int, run_command, say
+from srs_opt.command import Answer, Parser, make_parser, run_command, say
 
 if TYPE_CHECKING:
     from srs_opt.calibrate.result import Calibration
@@ -24,19 +24,13 @@ def build_parser() -> Parser:
         "and, from maps alone, sd_with_tracks (what tracks of the same gaits would leave; else null).",
         "python -m srs_opt.calibrate data/my_set --json",
         robot=False,
+        sweep=True,
     )
     parser.add_argument("dataset", type=Path, metavar="DATASET", help="folder of the data set")
     parser.add_argument(
         "--robot", type=Path, metavar="FILE", help="robot file to start from (default: the data set's own)"
     )
     parser.add_argument("--model", choices=("complex", "simplified"), default="complex", help="dynamic model")
-    parser.add_argument(
-        "--jobs",
-        type=positive_int,
-        default=2,
-        metavar="N",
-        help="processes (default 2; same answer)",
-    )
     return parser
 
 
@@ -51,7 +45,9 @@ def run(options: argparse.Namespace) -> Answer:
     dataset = load_dataset(options.dataset)
     if options.robot is not None:
         dataset = replace(dataset, robot=load_robot(options.robot))
-    found = calibrate(dataset, options.model, lambda message: say(options, message), options.jobs)
+    found = calibrate(
+        dataset, options.model, lambda message: say(options, message), options.jobs, options.cluster
+    )
     path = save_robot(found.robot, options.out / "robot.yaml")
     return Answer(_record(found), _summary(found), files=(path,))
 

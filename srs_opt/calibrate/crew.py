@@ -1,9 +1,10 @@
-"""Several processes, each with its own fixed share of the trials, so that results never depend on timing."""
+"""Who linearises trials: this process, several with fixed shares, or a cluster; same results."""
 
 from __future__ import annotations
 
 import multiprocessing
 from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext
 from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,17 @@ from srs_opt.processes import workers_deaf_to_interrupts
 
 if TYPE_CHECKING:
     from srs_opt.calibrate.fit import Experiment, Extra, Point
+
+
+def helped(
+    experiment: Experiment, jobs: int = 1, cluster: str | None = None
+) -> AbstractContextManager[object]:
+    """Return a context in which `jobs` processes, or the cluster at that address, share the trials."""
+    if cluster is not None:
+        from srs_opt.calibrate.cluster import ClusterCrew
+
+        return ClusterCrew(experiment, cluster)
+    return Crew(experiment, jobs) if jobs > 1 else nullcontext()
 
 
 class Crew:

@@ -21,6 +21,7 @@ from srs_opt.measurement.records import Bench, Trial
 from srs_opt.simulate.together import together
 
 if TYPE_CHECKING:
+    from srs_opt.calibrate.cluster import ClusterCrew
     from srs_opt.calibrate.crew import Crew
 
 Extra = Callable[[Trial, Prediction], np.ndarray]
@@ -79,7 +80,7 @@ class Experiment:
         count = sum(track.size for track in self.tracks.values() if track is not None)
         self.tolerance_m_s = tolerance_m_s or tolerance_for(count, sd_m)
         self.scatter_sd = np.array(list(SCATTER_SD.values()))
-        self.crew: Crew | None = None
+        self.crew: Crew | ClusterCrew | None = None
 
     def predict(
         self,

@@ -27,6 +27,8 @@ FINEST_M_S = 2e-7
 ACCEPTED = 15.0  # single steps may be worse: friction forgets an error of speed within milliseconds
 ATTEMPTS = 4
 _TAIL_S = 0.05  # simulated beyond the last label, for clocks that run late
+# (tolerance, cycle) -> what the valves did, and the mesh that served
+Meshes = dict[tuple[float, int], tuple[tuple[float, ...], Mesh]]
 
 
 @dataclass(frozen=True)
@@ -104,7 +106,7 @@ class TrialRun:
         self.model, self.trial = model, trial
         self.conditions = conditions_of(trial)
         self.timeline = timeline_of(trial, model.segments)
-        self._meshes: dict[tuple[float, int], tuple[tuple[float, ...], Mesh]] = {}
+        self.meshes: Meshes = {}
 
     def __call__(self, values: Values, tolerance_m_s: float = TOLERANCE_M_S) -> Nodes:
         """Simulate the trial, with a local error of `tolerance_m_s` in the body's speed.
@@ -146,7 +148,7 @@ class TrialRun:
         """Integrate one cycle on the mesh that served it last time, refined where that is too coarse."""
         phases = (*np.round(piece.duration_s, 7), *piece.valve.ravel())
         tolerance, number = key
-        kept = self._meshes.get(key) or self._meshes.get((tolerance, number - 1))
+        kept = self.meshes.get(key) or self.meshes.get((tolerance, number - 1))
         mesh = _fitted(kept, piece.duration_s, phases) or Mesh.uniform(piece.duration_s, STEP_S)
         for attempt in range(ATTEMPTS):
             got = yield Stretch(kernel, x, mesh, piece.valve, p)
@@ -154,7 +156,7 @@ class TrialRun:
             if got.error_m_s.max() <= ACCEPTED * tolerance or attempt == ATTEMPTS - 1:
                 break
             mesh = mesh.refined(got.error_m_s, tolerance)
-        self._meshes[key] = (phases, mesh)
+        self.meshes[key] = (phases, mesh)
         return got.states, mesh
 
 

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from contextlib import nullcontext
 
 from srs_opt.calibrate.coordinates import base_coordinates
-from srs_opt.calibrate.crew import Crew
+from srs_opt.calibrate.crew import helped
 from srs_opt.calibrate.fit import Experiment, fit, start_point
 from srs_opt.calibrate.maps import fit_maps
 from srs_opt.calibrate.model import Model
@@ -22,8 +21,11 @@ def calibrate(
     model: str = "complex",
     report: Callable[[str], None] | None = None,
     jobs: int = 1,
+    cluster: str | None = None,
 ) -> Calibration:
     """Fit the robot's parameters to all usable trials, or to the maps where there are no tracks.
+
+    `jobs` processes, or a Dask cluster (address of its scheduler), share the trials; same answer.
 
     Raises
     ------
@@ -51,7 +53,7 @@ def calibrate(
             )
     base = base_coordinates(dataset.robot)
     experiment = Experiment(Model(dataset.robot, model), trials, noise_sd_m(dataset), dataset.bench)
-    with Crew(experiment, jobs) if jobs > 1 else nullcontext():
+    with helped(experiment, jobs, cluster):
         found = fit(experiment, base, start_point(base), report=tell)
     before, after = math.sqrt(found.start_misfit_ratio), math.sqrt(found.misfit_ratio)
     return calibration(dataset.robot, found, before, after)

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from srs_opt.command import Answer, Parser, make_parser, positive_int, run_command, say
+from srs_opt.command import Answer, Parser, make_parser, run_command, say
 
 if TYPE_CHECKING:
     from srs_opt.discrepancy.pipeline import Discrepancy
@@ -23,6 +23,7 @@ def build_parser() -> Parser:
         "gap (m, root mean square per coordinate), next_experiment, candidates, corrected_robot, seconds.",
         "python -m srs_opt.discrepancy data/my_set --json",
         robot=False,
+        sweep=True,
     )
     parser.add_argument("dataset", type=Path, metavar="DATASET", help="folder of the data set")
     parser.add_argument(
@@ -32,13 +33,6 @@ def build_parser() -> Parser:
         help="YAML list of effect names to consider (default: all that are known)",
     )
     parser.add_argument("--model", choices=("complex", "simplified"), default="complex", help="dynamic model")
-    parser.add_argument(
-        "--jobs",
-        type=positive_int,
-        default=2,
-        metavar="N",
-        help="processes (default 2; same answer)",
-    )
     return parser
 
 
@@ -58,6 +52,7 @@ def run(options: argparse.Namespace) -> Answer:
         model=options.model,
         seed=options.seed,
         jobs=options.jobs,
+        cluster=options.cluster,
         report=lambda message: say(options, message),
     )
     robot = corrected_robot(found)

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass
 
 from srs_opt.calibrate.coordinates import Candidate, all_candidates, base_coordinates
-from srs_opt.calibrate.crew import Crew
+from srs_opt.calibrate.crew import helped
 from srs_opt.calibrate.fit import Experiment, start_point
 from srs_opt.calibrate.model import Model
 from srs_opt.calibrate.noise import noise_sd_m
@@ -72,6 +71,7 @@ def find_discrepancy(
     model: str = "complex",
     seed: int = 0,
     jobs: int = 1,
+    cluster: str | None = None,
     report: Callable[[str], None] | None = None,
 ) -> Discrepancy:
     """Find what the model lacks.
@@ -85,6 +85,8 @@ def find_discrepancy(
     seed : int
     jobs : int
         Processes; the answer does not depend on it.
+    cluster : str, optional
+        Address of a Dask scheduler that gets the work instead, ``host:port``.
     report : callable, optional
         Told what is being done.
     """
@@ -95,7 +97,7 @@ def find_discrepancy(
     if not split.enough:
         return _not_testable(dataset, split, sd, started)
     experiment = Experiment(Model(dataset.robot, model), (*split.open, *split.sealed), sd, dataset.bench)
-    with Crew(experiment, jobs) if jobs > 1 else nullcontext():
+    with helped(experiment, jobs, cluster):
         return _examine(dataset, experiment, split, _candidates(dataset, effects), seed, tell, started)
 
 

@@ -1,0 +1,106 @@
+"""Trials linearised by the workers of a Dask cluster, bit for bit as here, whichever worker is lost."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+from srs_opt.calibrate.coordinates import Coordinate
+from srs_opt.calibrate.experiment import Experiment, Extra, Point
+from srs_opt.calibrate.gram import TrialGram
+from srs_opt.calibrate.model import Model
+from srs_opt.calibrate.nominal import Meshes
+from srs_opt.errors import NoAnswerError
+from srs_opt.measurement.records import Trial
+from srs_opt.robot import Robot
+from srs_opt.sweep import chunks, connect
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+SHARE = 4  # trials of one task, simulated side by side
+Setup = tuple[Robot, str, float, float]
+
+
+class ClusterCrew:
+    """Has a cluster linearise an experiment's trials; a context manager.
+
+    A task carries all that it depends on, the trials' last meshes included, so that it can be done again
+    elsewhere.
+
+    Parameters
+    ----------
+    experiment : Experiment
+    address : str
+        Of the scheduler, ``host:port``.
+    """
+
+    def __init__(self, experiment: Experiment, address: str) -> None:
+        self.experiment = experiment
+        model = experiment.model
+        self._setup: Setup = (model.robot, model.full.model, experiment.sd_m, experiment.tolerance_m_s)
+        self._client: Client = connect(address)
+
+    def __enter__(self) -> ClusterCrew:
+        self.experiment.crew = self
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.experiment.crew = None
+        self._client.close()
+
+    def grams(
+        self, trials: Sequence[Trial], point: Point, coordinates: Sequence[Coordinate], extra: Extra | None
+    ) -> dict[str, TrialGram]:
+        """Return the Gram matrices of `trials`.
+
+        Raises
+        ------
+        NoAnswerError
+            If a trial cannot be simulated at `point`.
+        """
+        runs = self.experiment.runs
+        tasks = []
+        for share in chunks(trials, SHARE):
+            meshes = {t.name: runs[t.name].meshes for t in share}
+            asked = (self._setup, tuple(share), meshes, point, tuple(coordinates), extra)
+            tasks.append(self._client.submit(_linearise, *asked, pure=False))
+        found: dict[str, TrialGram] = {}
+        failure: str | None = None
+        for grams, meshes in self._client.gather(tasks):
+            for name, known in meshes.items():
+                runs[name].meshes = known
+            if isinstance(grams, str):
+                failure = grams
+            else:
+                found.update(grams)
+        if failure is not None:
+            raise NoAnswerError(failure)
+        return found
+
+
+def _linearise(
+    setup: Setup,
+    trials: tuple[Trial, ...],
+    meshes: Mapping[str, Meshes],
+    point: Point,
+    coordinates: tuple[Coordinate, ...],
+    extra: Extra | None,
+) -> tuple[dict[str, TrialGram] | str, dict[str, Meshes]]:
+    """Return the Gram matrices, or why there are none, and the meshes to go on with; runs on a worker."""
+    robot, model, sd_m, tolerance_m_s = setup
+    experiment = Experiment(_model(robot, model), trials, sd_m, tolerance_m_s=tolerance_m_s)
+    for t in trials:
+        experiment.runs[t.name].meshes = dict(meshes[t.name])
+    grams: dict[str, TrialGram] | str
+    try:
+        grams = experiment.own_grams(trials, point, coordinates, extra)
+    except NoAnswerError as error:
+        grams = str(error)
+    return grams, {t.name: experiment.runs[t.name].meshes for t in trials}
+
+
+@lru_cache(maxsize=4)
+def _model(robot: Robot, model: str) -> Model:
+    return Model(robot, model)
