@@ -11,12 +11,8 @@ which should be 0 and 1, and by how much the fit narrows the bench's deviation.
 
 from __future__ import annotations
 
-import argparse
-import json
-import os
 import sys
 import tempfile
-import time
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -24,6 +20,7 @@ import numpy as np
 
 from benchmarks.intervals import interval, rate
 from benchmarks.section import Section
+from benchmarks.stored import gather, stored_rows, study_parser
 
 LEVEL, WIDTH = 0.90, 1.6449
 TRIALS, SECONDS = 8, 3.0
@@ -59,13 +56,6 @@ def pulls(seed: int) -> Row:
     }
 
 
-def study(sets: int, seed: int, jobs: int) -> list[Row]:
-    """Return the pulls of `sets` generated sets."""
-    from joblib import Parallel, delayed
-
-    return list(Parallel(n_jobs=jobs)(delayed(pulls)(10_000 * seed + k) for k in range(sets)))
-
-
 def table(rows: Sequence[Row]) -> tuple[list[list[str]], bool]:
     """Return the report's table, and whether every parameter's rate agrees with LEVEL."""
     lines, good = [], True
@@ -83,42 +73,34 @@ def table(rows: Sequence[Row]) -> tuple[list[list[str]], bool]:
     return lines, good
 
 
+def seeds(sets: int, seed: int) -> list[tuple[int]]:
+    """Return the seed of every set."""
+    return [(10_000 * seed + k,) for k in range(sets)]
+
+
 def run(quick: bool) -> Section:
-    """Return the report's section."""
-    sets = 4 if quick else 200
-    cpu = time.process_time()
-    rows = study(sets, 1, 1)
-    lines, _ = table(rows)
+    """Return the coverage of the stored study; of four sets, measured now, where there is none."""
+    stored = None if quick else stored_rows("calibrate_coverage")
+    if stored is None:
+        stored = "now", [pulls(*seed) for seed in seeds(4, 1)]
+    measured, rows = stored
     return Section(
         "Calibration: do intervals cover the truth?",
         (*COLUMNS, "(estimate - truth)/sd", "sd over the bench's sd"),
-        lines,
+        table(rows)[0],
         [
-            f"{sets} generated sets of {TRIALS} trials of {SECONDS:g} s, nothing hidden, bench values off, "
-            f"noise misstated by up to a factor 2; {(time.process_time() - cpu) / sets:.1f} s of processor "
-            "time per set, generating it included."
+            f"{len(rows)} generated sets of {TRIALS} trials of {SECONDS:g} s, nothing hidden, bench values "
+            f"off, noise misstated by up to a factor 2. Measured {measured}."
         ],
     )
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Run the benchmark and print the coverage of every parameter."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--sets", type=int, default=200)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
-    parser.add_argument("--rows", type=Path, help="write every set's pulls to this file, one JSON per line")
-    options = parser.parse_args(argv)
-    started = time.perf_counter()
-    rows = study(options.sets, options.seed, options.jobs)
-    if options.rows is not None:
-        options.rows.write_text("".join(json.dumps(row) + "\n" for row in rows))
-    lines, good = table(rows)
+    """Run the study and print the coverage of every parameter."""
+    options = study_parser("calibrate_coverage", __doc__, 200).parse_args(argv)
+    lines, good = table(gather("calibrate_coverage", pulls, seeds(options.sets, options.seed), options))
     for name, hits, span, inside, spread, narrowed in lines:
         print(f"{name:34s} {hits}  [{span}]  {inside:3s}  {spread}  {narrowed}")
-    print(f"{options.sets} sets, {time.perf_counter() - started:.0f} s on {options.jobs} processes")
     return 0 if good else 1
 
 
