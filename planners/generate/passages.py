@@ -16,7 +16,6 @@ Cell = tuple[int, int]
 """Row (upwards) and column."""
 Passage = frozenset[Cell]
 START: Cell = (0, 0)
-METHODS = ("depth-first", "wilson")
 
 
 @dataclass(frozen=True, eq=False)

@@ -186,15 +186,7 @@ def _cycles(timeline: Timeline, period_s: float) -> list[Timeline]:
     boundary = period_s
     for k, end in enumerate(ends):
         if end >= boundary - 1e-9 or k - start >= 60 or k == ends.size - 1:
-            cut = slice(start, k + 1)
-            pieces.append(
-                Timeline(
-                    timeline.duration_s[cut],
-                    timeline.valve[:, cut],
-                    timeline.pressure_kpa[cut],
-                    timeline.frequency_hz[cut],
-                )
-            )
+            pieces.append(timeline.part(slice(start, k + 1)))
             start = k + 1
             boundary = (math.floor((end + 1e-9) / period_s) + 1) * period_s
     return pieces

@@ -11,18 +11,10 @@ from srs_opt.drive.calibration import DriveCalibration, fit_calibration
 from srs_opt.errors import InputError
 from srs_opt.files import read_text
 from srs_opt.gait_map.grid import map_points
+from srs_opt.measurement.bench_files import MAP_COLUMNS
 from srs_opt.robot import Robot
 
-_COLUMNS = (
-    "frequency_hz",
-    "pressure_kpa",
-    "offset",
-    "phase_lag_rad",
-    "speed_m_s",
-    "speed_sd_m_s",
-    "radius_m",
-    "radius_sd_m",
-)
+_COLUMNS = MAP_COLUMNS[: MAP_COLUMNS.index("replicates")]
 
 
 @dataclass(frozen=True)

@@ -13,11 +13,6 @@ from srs_opt.model.registry import build
 POINTS_PER_ARC = 6
 
 
-def points_on_centre_line(links: int) -> int:
-    """Return how many points `centre_line_function` gives."""
-    return (links - 1) * (POINTS_PER_ARC + 2) + 1
-
-
 @lru_cache(maxsize=32)
 def centre_line_function(structure: Structure, samples: int) -> ca.Function:
     """Return ``(kappa (N-1, samples), p) -> (x, y) (points, samples)`` in the robot's frame, tail to head.

@@ -20,7 +20,7 @@ from srs_opt.orbit.laps import Lapped, lap, plain_lap
 from srs_opt.simulate.integrate import LOOSE, TOLERANCE_M_S, Integrator
 from srs_opt.simulate.mesh import Mesh
 from srs_opt.simulate.rosenbrock import BODY_STATES, LEVER_M
-from srs_opt.simulate.together import Search, alone
+from srs_opt.simulate.together import Search
 
 _NEWTON_STEPS = 30
 _CLOSED_M_S = 1e-9
@@ -46,7 +46,6 @@ class PeriodicSolution:
         Of (u_x, u_y, yaw rate x lever), so that entries compare.
     residual_m_s : float
         By how much the velocity fails to repeat.
-    newton_steps : int
     """
 
     start: np.ndarray
@@ -55,7 +54,6 @@ class PeriodicSolution:
     valve: np.ndarray
     monodromy: np.ndarray
     residual_m_s: float
-    newton_steps: int
 
 
 def periodic_actuators(run: Integrator, gait: Gait, p: np.ndarray) -> np.ndarray:
@@ -98,13 +96,6 @@ def _hold_function(structure: Structure) -> ca.Function:
     act, valve, h = ca.SX.sym("act", actuator.states), ca.SX.sym("valve", structure.segments), ca.SX.sym("h")
     after = actuator.advance(actuator.unstack(act), valve, h).vector()
     return ca.Function("hold", [act, valve, h, parameters.vector], [after], {"cse": True})
-
-
-def solve_orbit(
-    run: Integrator, gait: Gait, tolerance: float = TOLERANCE_M_S, guess: np.ndarray | None = None
-) -> PeriodicSolution:
-    """Return the periodic orbit of `gait`; see `search_orbit`."""
-    return alone(search_orbit(run, gait, tolerance, guess))
 
 
 def search_orbit(
@@ -201,7 +192,7 @@ def _closed(
             break
     assert lapped is not None
     monodromy = cycle.scale[:, None] * lapped.monodromy / cycle.scale
-    return PeriodicSolution(cycle.start(velocity), lapped.states, mesh, cycle.valve, monodromy, size, total)
+    return PeriodicSolution(cycle.start(velocity), lapped.states, mesh, cycle.valve, monodromy, size)
 
 
 def _newton(

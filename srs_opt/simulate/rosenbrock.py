@@ -43,11 +43,6 @@ BODY_STATES = 7
 LEVER_M = 0.1  # turns an error in yaw rate into one in speed
 
 
-def state_size(structure: Structure) -> int:
-    """Return the length of a state: pose (3), body velocity (3), friction work, actuators."""
-    return BODY_STATES + build(structure)[2].states
-
-
 class _BodyField:
     """Right-hand side of pose, velocity and friction work as functions that can be called per stage."""
 
@@ -102,9 +97,9 @@ class _StageSolver:
 def step_function(structure: Structure) -> ca.Function:
     """Return ``step(x, valve, h, p) -> (x_next, error)``: one RODAS step with the valves held.
 
-    `x` is (state_size,), `valve` (N-1,) in [-1, 1], `h` in s (zero is allowed and does nothing), `p` as
-    packed by `Parameters`. `error` is the embedded estimate of the local error of the body's
-    velocity, m/s.
+    `x` holds pose (3), body velocity (3), friction work and the actuators' states; `valve` is (N-1,) in
+    [-1, 1], `h` in s (zero is allowed and does nothing), `p` as packed by `Parameters`. `error` is the
+    embedded estimate of the local error of the body's velocity, m/s.
     """
     parameters, mechanics, actuator = build(structure)
     x = ca.SX.sym("x", BODY_STATES + actuator.states)

@@ -64,6 +64,15 @@ class Timeline:
             np.concatenate([p.frequency_hz for p in parts]),
         )
 
+    def part(self, phases: slice) -> Timeline:
+        """Return some of the phases."""
+        return Timeline(
+            self.duration_s[phases],
+            self.valve[:, phases],
+            self.pressure_kpa[phases],
+            self.frequency_hz[phases],
+        )
+
     def until(self, end_s: float) -> Timeline:
         """Return the timeline cut off at `end_s`."""
         ends = np.cumsum(self.duration_s)
