@@ -123,14 +123,16 @@ def run(options: argparse.Namespace) -> Answer:
     """Optimize, certify, write the files."""
     if options.table:
         return _run_table(options)
+    import shutil
     import time
+    from functools import partial
 
     from srs_opt.files import write_json
     from srs_opt.gait_file import load_gait
     from srs_opt.gait_opt.figures import draw_convergence, draw_gait
     from srs_opt.gait_opt.free import search_free
     from srs_opt.gait_opt.report import record, summary
-    from srs_opt.gait_opt.search import search
+    from srs_opt.gait_opt.search import Where, search
     from srs_opt.model.parameters import room_effects
     from srs_opt.simulate import compiled
 
@@ -143,11 +145,16 @@ def run(options: argparse.Namespace) -> Answer:
     warm = load_gait(options.warm, problem.limits.pressure_kpa[1]) if options.warm else None
     begun, compiled_before = time.perf_counter(), compiled.compile_seconds
     extra = {}
+    unfinished = options.out / "starts.unfinished"  # an interrupted search can go on from here
+    where = Where(options.jobs, options.cluster, unfinished)
+    asked = problem, options.starts, options.seed, partial(say, options)
     if options.valves == "free":
-        freed = search_free(problem, options.starts, options.seed, lambda text: say(options, text))
+        freed = search_free(*asked, where=where)
         found, extra = freed.found, {"free": freed.record()}
     else:
-        found = search(problem, options.starts, options.seed, lambda text: say(options, text), warm)
+        found = search(*asked, warm, where=where)
+    if not found.interrupted:
+        shutil.rmtree(unfinished, ignore_errors=True)
     compile_s = compiled.compile_seconds - compiled_before
     answer = {**record(problem, found, time.perf_counter() - begun - compile_s, compile_s), **extra}
     files = [

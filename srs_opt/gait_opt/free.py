@@ -17,7 +17,7 @@ from srs_opt.gait_opt.collocation.problem import CycleProblem
 from srs_opt.gait_opt.finish import finished
 from srs_opt.gait_opt.ladder import Rung, bounded, climb, orbits_of
 from srs_opt.gait_opt.score import score
-from srs_opt.gait_opt.search import Found, search
+from srs_opt.gait_opt.search import HERE, Found, Where, search
 from srs_opt.gait_opt.switch_times import optimize_switch_times
 
 ELEMENTS = 40  # of the relaxed problem; valve levels have the same grid
@@ -77,10 +77,15 @@ class FreeResult:
 
 
 def search_free(
-    problem: CycleProblem, starts: int = 4, seed: int = 0, say: Callable[[str], None] = lambda text: None
+    problem: CycleProblem,
+    starts: int = 4,
+    seed: int = 0,
+    say: Callable[[str], None] = lambda text: None,
+    *,
+    where: Where = HERE,
 ) -> FreeResult:
     """Return the best gait with at most ``problem.intervals`` on-intervals per segment and cycle."""
-    wave = search(replace(problem, intervals=1), starts, seed, say)
+    wave = search(replace(problem, intervals=1), starts, seed, say, where=where)
     relaxation = relax(problem, wave.gait)
     at_limits = 100 * np.mean(np.abs(relaxation.levels) > 0.95)
     say(

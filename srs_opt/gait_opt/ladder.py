@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -60,6 +61,11 @@ class Step:
     trouble: str = ""
     elements: int = 0
     defect: float | None = None
+
+    @staticmethod
+    def of_record(record: dict[str, Any]) -> Step:
+        """Return the step that ``dataclasses.asdict`` made a record of."""
+        return Step(**{**record, "rung": Rung(**record["rung"])})
 
     @property
     def relative_error(self) -> float:

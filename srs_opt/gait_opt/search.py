@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
 
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait
@@ -12,17 +15,30 @@ from srs_opt.gait_opt.aim import within
 from srs_opt.gait_opt.certificate import Certificate, certify
 from srs_opt.gait_opt.collocation.problem import CycleProblem
 from srs_opt.gait_opt.finish import finished
-from srs_opt.gait_opt.ladder import Climb, Rung, Step, climb, ladder
-from srs_opt.gait_opt.score import Score
+from srs_opt.gait_opt.ladder import Climb, Rung, Step, climb, ladder, orbits_of
+from srs_opt.gait_opt.score import Score, score
 from srs_opt.gait_opt.starts import starting_gaits, steered
 from srs_opt.gait_opt.switch_times import optimize_switch_times
 from srs_opt.orbit.steady import Orbit
+from srs_opt.sweep import Resume, sweep
 
 Say = Callable[[str], None]
 _CARRIED = 2  # starts that are carried to the robot's own friction
 _ALIKE = 1e-3  # merits closer than this are one optimum
 _WARM_REACH = 0.05
 _EXACT_REACH = 0.01
+
+
+@dataclass(frozen=True)
+class Where:
+    """What takes the starts up the ladder: processes here or a cluster; and where finished ones are kept."""
+
+    jobs: int = 1
+    cluster: str | None = None
+    resume: Path | None = None
+
+
+HERE = Where()
 
 
 @dataclass(frozen=True)
@@ -36,7 +52,7 @@ class Found:
     orbits : tuple of Orbit, one per robot
     certificate : Certificate
     merits : tuple of float
-        Best merit of every start, in the order of the starts (at the rung to which it was carried).
+        Best merit of every start that led somewhere, in their order (at the rung to which it was carried).
     steps : tuple of Step
         Of the winning start.
     iterations, seconds
@@ -61,6 +77,8 @@ def search(
     seed: int = 0,
     say: Say = lambda text: None,
     warm: Gait | None = None,
+    *,
+    where: Where = HERE,
 ) -> Found:
     """Return the best gait found for `problem`.
 
@@ -70,6 +88,8 @@ def search(
         The published gait, then quasi-random waves.
     warm : Gait, optional
         The result of an earlier search: start from it alone, near the top of the ladder.
+    where : Where
+        What climbs the ladder; the result is the same.
 
     Raises
     ------
@@ -86,61 +106,81 @@ def search(
     else:
         candidates, lower = [steered(problem, within(problem.limits, warm))], ()
         upper = (Rung(max(own, 0.004), 64, _WARM_REACH, 2), Rung(own, 80, _WARM_REACH / 2, 2))
-    climbs, interrupted = _explore(problem, candidates, lower, say)
-    order = sorted(range(len(climbs)), key=lambda k: -climbs[k].score.total)
-    carried: list[Climb] = []
-    for k in _distinct(order, climbs)[:_CARRIED]:
+    climbing = _Climbing(problem, len(candidates), say)
+    climbs, interrupted = _all(climbing, list(enumerate(candidates)), lower, where)
+    if not climbs:
         if interrupted:
-            break
-        try:
-            top = climb(problem, climbs[k].gait, upper, _reporter(say, k, len(climbs)))
-        except KeyboardInterrupt:
-            interrupted = True
-            break
-        except NoAnswerError:
-            continue
-        top = Climb(top.gait, top.orbits, top.score, (*climbs[k].steps, *top.steps))
-        climbs[k] = top
-        carried.append(top)
-    best = max(carried or climbs, key=lambda c: c.score.total)
-    top_start = next(k for k, c in enumerate(climbs) if c is best)
-    exact = optimize_switch_times(problem, best.gait, _EXACT_REACH, _reporter(say, top_start, len(climbs)))
+            raise KeyboardInterrupt
+        raise NoAnswerError("no start leads to a steady gait inside the limits")
+    if not interrupted:
+        chosen = _distinct(climbs)[:_CARRIED]
+        carried, interrupted = _all(climbing, [(k, climbs[k].gait) for k in chosen], upper, where)
+        for k, top in carried.items():
+            climbs[k] = replace(top, steps=(*climbs[k].steps, *top.steps))
+        best = max(carried or climbs, key=lambda k: climbs[k].score.total)
+    else:
+        best = max(climbs, key=lambda k: climbs[k].score.total)
+    reached = climbs[best].gait
+    exact = optimize_switch_times(problem, reached, _EXACT_REACH, _reporter(say, best, len(candidates)))
     certificate, orbits = certify(problem, finished(problem, exact.gait), exact.claimed_m_s)
     return Found(
         orbits[0].gait,
         orbits,
         certificate,
-        tuple(c.score.merit for c in climbs),
-        (*best.steps, *exact.steps),
-        sum(c.iterations for c in climbs) + sum(s.iterations for s in exact.steps),
+        tuple(c.score.merit for c in climbs.values()),
+        (*climbs[best].steps, *exact.steps),
+        sum(c.iterations for c in climbs.values()) + sum(s.iterations for s in exact.steps),
         time.perf_counter() - begun,
         interrupted,
     )
 
 
-def _explore(
-    problem: CycleProblem, candidates: list[Gait], rungs: tuple[Rung, ...], say: Say
-) -> tuple[list[Climb], bool]:
-    climbs: list[Climb] = []
-    reasons = []
-    for k, start in enumerate(candidates):
+@dataclass(frozen=True)
+class _Climbing:
+    """What all starts have in common."""
+
+    problem: CycleProblem
+    starts: int
+    say: Say
+
+    def __call__(self, rungs: tuple[Rung, ...], pieces: Sequence[tuple[int, Gait]]) -> list[dict[str, Any]]:
+        """Take each gait up the rungs; return records of where it came and by which steps."""
+        return [self._one(rungs, k, gait) for k, gait in pieces]
+
+    def _one(self, rungs: tuple[Rung, ...], start: int, gait: Gait) -> dict[str, Any]:
         try:
-            climbs.append(climb(problem, start, rungs, _reporter(say, k, len(candidates))))
+            found = climb(self.problem, gait, rungs, _reporter(self.say, start, self.starts))
         except NoAnswerError as error:
-            reasons.append(str(error))
-            say(f"start {k + 1} of {len(candidates)}: {error}")
-        except KeyboardInterrupt:
-            if not climbs:
-                raise
-            return climbs, True
-    if not climbs:
-        raise NoAnswerError(f"no start leads to a steady gait inside the limits: {reasons[-1]}")
+            self.say(f"start {start + 1} of {self.starts}: {error}")
+            return {"gait": None, "steps": []}
+        return {"gait": found.gait.record(), "steps": [asdict(step) for step in found.steps]}
+
+
+def _all(
+    climbing: _Climbing, gaits: list[tuple[int, Gait]], rungs: tuple[Rung, ...], where: Where
+) -> tuple[dict[int, Climb], bool]:
+    """Return the climbs of all starts that lead somewhere, and whether Ctrl-C ended them early."""
+    problem = climbing.problem
+    kept = None if where.resume is None else Resume(where.resume, f"gait_opt {problem} {rungs}")
+    work = partial(climbing, rungs)
+    records = sweep(work, gaits, chunk=1, jobs=where.jobs, cluster=where.cluster, resume=kept)
+    climbs: dict[int, Climb] = {}
+    try:
+        for (k, _), record in zip(gaits, records):
+            if record["gait"] is not None:
+                gait = Gait.of_record(record["gait"])
+                orbits = orbits_of(problem, gait)
+                steps = tuple(Step.of_record(step) for step in record["steps"])
+                climbs[k] = Climb(gait, orbits, score(problem, gait, orbits), steps)
+    except KeyboardInterrupt:
+        return climbs, True
     return climbs, False
 
 
-def _distinct(order: list[int], climbs: list[Climb]) -> list[int]:
+def _distinct(climbs: dict[int, Climb]) -> list[int]:
+    """Return the starts, best first, without those that came to the same optimum as a better one."""
     kept: list[int] = []
-    for k in order:
+    for k in sorted(climbs, key=lambda k: -climbs[k].score.total):
         if all(abs(climbs[k].score.total - climbs[j].score.total) > _ALIKE for j in kept):
             kept.append(k)
     return kept

@@ -11,6 +11,7 @@ import pytest
 
 from srs_opt.errors import InputError
 from srs_opt.gait import Gait, Wave, published_wave
+from srs_opt.gait_opt import search as search_module
 from srs_opt.gait_opt.__main__ import main
 from srs_opt.gait_opt.aim import aimed, end_for_end, evened, in_step, leaned, on_ticks, within
 from srs_opt.gait_opt.certificate import certify, periodicity_gap, self_clearance_m
@@ -18,7 +19,7 @@ from srs_opt.gait_opt.collocation.problem import CycleProblem
 from srs_opt.gait_opt.goal import Goal, Limits, air_work_j, chamber_volume_m3
 from srs_opt.gait_opt.ladder import Rung, climb
 from srs_opt.gait_opt.report import wave_parameters
-from srs_opt.gait_opt.search import search
+from srs_opt.gait_opt.search import Where, search
 from srs_opt.orbit.steady import integrator, steady_gait
 from srs_opt.robot import wpi_srs
 from srs_opt.simulate.integrate import Integrator
@@ -136,6 +137,30 @@ def test_interrupted_search_keeps_the_best():
     found = search(CycleProblem((ROBOT,), "complex", Goal(), Limits()), starts=2, say=say)
     assert found.interrupted
     assert found.orbits[0].speed_m_s > 0.23
+
+
+@pytest.mark.slow
+def test_starts_give_the_same_bits_wherever_they_run_and_go_on(monkeypatch, tmp_path):
+    rungs = Rung(0.03, 30, 0.1, 1), Rung(0.004, 50, 0.05, 1)
+    monkeypatch.setattr(search_module, "ladder", lambda own_m_s: rungs)
+    problem = CycleProblem((ROBOT,), "complex", Goal(), Limits())
+    told = []
+
+    def say(text):
+        told.append(text)
+        if len(told) == 2:
+            raise KeyboardInterrupt
+
+    here = search(problem, starts=2)
+    assert search(problem, starts=2, say=say, where=Where(resume=tmp_path)).interrupted
+    told.append("no second interrupt")
+    again = search(problem, starts=2, say=say, where=Where(resume=tmp_path))
+    spread = search(problem, starts=2, where=Where(jobs=2))
+    assert not any(line.startswith("start 1 of 2: friction smoothed at 0.03") for line in told[3:])
+    for other in (again, spread):
+        assert other.gait == here.gait
+        assert other.merits == here.merits
+        assert other.iterations == here.iterations
 
 
 def test_an_interrupt_inside_the_solver_is_not_lost():
