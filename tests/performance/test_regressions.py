@@ -5,14 +5,15 @@ import json
 
 import pytest
 
-from benchmarks.__main__ import REFERENCE
+from benchmarks.__main__ import REFERENCE, names
 from benchmarks.memory import LIMIT_MB, peak_mb
 
 FACTOR = 2.0
+MEASURED = ("simulation", "maps")
 TRIES = 3  # a busy machine is no regression; a slow program is slow every time
 
 
-@pytest.mark.parametrize("name", ["simulation", "maps"])
+@pytest.mark.parametrize("name", MEASURED)
 def test_no_ratio_has_doubled(name):
     reference = json.loads(REFERENCE.read_text())
     for attempt in range(TRIES):
@@ -21,6 +22,16 @@ def test_no_ratio_has_doubled(name):
         if not slow:
             break
         assert attempt < TRIES - 1, slow
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("default")  # clusters close noisily on a busy machine
+@pytest.mark.parametrize("name", sorted(set(names()) - set(MEASURED)))
+def test_every_other_section_can_be_made(name):
+    section = importlib.import_module(f"benchmarks.{name}").run(quick=True)
+    assert section.rows
+    assert all(len(row) == len(section.columns) for row in section.rows)
+    assert section.markdown().startswith("## ")
 
 
 def test_large_maps_fit_into_memory():
