@@ -85,8 +85,6 @@ def _add_limits(parser: Parser) -> None:
 
 def problem_from(options: argparse.Namespace) -> CycleProblem:
     """Return the problem that the options describe."""
-    from dataclasses import replace
-
     from srs_opt.errors import InputError
     from srs_opt.gait_opt.collocation.problem import CycleProblem
     from srs_opt.gait_opt.goal import Goal
@@ -94,7 +92,7 @@ def problem_from(options: argparse.Namespace) -> CycleProblem:
 
     robots: list[Robot] = [load_robot(path) for path in options.robots or [options.robot]]
     if options.valve_delay is not None:
-        robots = [replace(r, valve_delay_s=options.valve_delay) for r in robots]
+        robots = [r.with_values(valve_delay_s=options.valve_delay) for r in robots]
     goal = Goal(options.objective, options.speed, options.radius, options.turn_rate, options.envelope)
     if options.intervals > 1 and options.valves != "free":
         raise InputError("--intervals goes with --valves free: a wave has one interval per segment and cycle")

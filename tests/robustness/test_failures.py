@@ -99,6 +99,7 @@ CASES = [
     ("srs_opt.gait_opt", ["--radius", "0"], 2, "radius"),
     ("srs_opt.gait_opt", ["--radius", "1", "--turn-rate", "1"], 2, "not both"),
     ("srs_opt.gait_opt", ["--tick", "0"], 2, "--tick"),
+    ("srs_opt.gait_opt", ["--valve-delay", "-1"], 2, "valve_delay_s: must be at least 0"),
     ("srs_opt.gait_opt", ["--min-dwell", "3"], 2, "--min-dwell"),
     ("srs_opt.gait_opt", ["--warm", "{tmp}/gait.json"], 2, "missing"),
     ("srs_opt.gait_opt", ["--robots", "{tmp}/absent.yaml"], 2, "no such file"),
