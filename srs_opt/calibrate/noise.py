@@ -11,6 +11,7 @@ from srs_opt.measurement.records import DataSet, Trial
 ORDER = 4
 _LEAST = 50  # differences that an estimate needs
 _MAD = 0.674489750196  # median |x| of a unit normal
+_WILD = 5.0  # robust standard deviations beyond which a difference is a jump, not noise
 
 
 def track_of(trial: Trial) -> np.ndarray | None:
@@ -31,5 +32,7 @@ def noise_sd_m(dataset: DataSet) -> float:
     if pooled.size < _LEAST:
         return dataset.marker_sd_m
     gain = np.sqrt(comb(2 * ORDER, ORDER))
-    sd = float(np.median(np.abs(pooled)) / _MAD / gain)
+    size = np.abs(pooled)
+    usual = np.median(size) / _MAD
+    sd = float(np.sqrt(np.mean(size[size <= _WILD * usual] ** 2)) / gain)
     return sd if sd > 0 else dataset.marker_sd_m
