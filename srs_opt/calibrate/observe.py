@@ -13,6 +13,7 @@ from srs_opt.calibrate.coordinates import Coordinate
 from srs_opt.calibrate.model import CAMERA, Model, Values
 from srs_opt.calibrate.nominal import Nodes
 from srs_opt.calibrate.sensitivity import evaluate, mapped, variation
+from srs_opt.calibrate.tangents import exact_variation
 from srs_opt.measurement.records import Trial
 from srs_opt.model.effects import all_effects
 from srs_opt.model.parameters import Structure
@@ -134,7 +135,10 @@ def predict(
     jac_pose = by_pose.reshape(frames, 3, seen).transpose(0, 2, 1)
     jac_kappa = by_kappa.reshape(frames, -1, seen).transpose(0, 2, 1)
     if moving.size:
-        varied = variation(structure, nodes, nodes.p[kept], seeds[:, moving], trial.heading_rad, width)
+        if structure == model.structures[0]:
+            varied = exact_variation(structure, nodes, nodes.p[kept], seeds[:, moving], trial.heading_rad)
+        else:
+            varied = variation(structure, nodes, nodes.p[kept], seeds[:, moving], trial.heading_rad, width)
         part = jac_pose @ _linear(nodes.time_s, varied.pose, at)
         part += jac_kappa @ _linear(nodes.time_s, varied.kappa, at)
         jac_p = by_p.reshape(frames, -1, seen).transpose(0, 2, 1)

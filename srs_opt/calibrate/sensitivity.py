@@ -8,6 +8,7 @@ need none of this: they shift the motion in time, so their derivative is minus t
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from functools import lru_cache
 
 import casadi as ca
@@ -98,6 +99,7 @@ def evaluate(function: ca.Function, moving: tuple[np.ndarray, ...], *fixed: np.n
     return out
 
 
+@dataclass(frozen=True)
 class Variation:
     """Sensitivities of one trial at its nodes.
 
@@ -105,12 +107,10 @@ class Variation:
     ----------
     pose : array (nodes, 3, K)
     kappa : array (nodes, N-1, K)
-    body_rate : array (nodes, 6)
-        Time derivative of pose and velocity.
     """
 
-    def __init__(self, pose: np.ndarray, kappa: np.ndarray, body_rate: np.ndarray) -> None:
-        self.pose, self.kappa, self.body_rate = pose, kappa, body_rate
+    pose: np.ndarray
+    kappa: np.ndarray
 
 
 def _decay(a: np.ndarray, h: np.ndarray) -> np.ndarray:
@@ -213,9 +213,7 @@ def variation(
     `p` and the rows of `seeds` are the parameters of `structure`, which may be smaller than the nodes' own.
     """
     shape = shape_variation(structure, nodes, p, seeds, width)
-    rate, by_body, by_shape, by_p = evaluate(
-        _body_slopes(structure), (nodes.body, nodes.kappa, nodes.dkappa), p
-    )
+    _, by_body, by_shape, by_p = evaluate(_body_slopes(structure), (nodes.body, nodes.kappa, nodes.dkappa), p)
     count = nodes.time_s.size
     a = np.ascontiguousarray(by_body.reshape(count, 6, 6).transpose(0, 2, 1))
     c = by_shape.reshape(count, -1, 6).transpose(0, 2, 1)
@@ -227,4 +225,4 @@ def variation(
     start = np.zeros((6, seeds.shape[1]))
     start[:3] = start_pose(structure, p, heading_rad)[1] @ seeds
     states = _solve(_decay(middle, h), _forcing(middle, h, b[:-1], b[1:]), start)
-    return Variation(states[:, :3], shape[:, : structure.segments], rate)
+    return Variation(states[:, :3], shape[:, : structure.segments])

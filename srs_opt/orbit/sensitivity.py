@@ -129,7 +129,7 @@ def _follow(run: Integrator, orbit: Orbit, p: np.ndarray, directions: list[_Dire
     solution, nx = orbit.solution, run.states
     states = np.concatenate([solution.start[:, None], solution.states], axis=1)
     h_s, valve = solution.mesh.h_s, solution.valve.T[solution.mesh.phase]
-    kernel = _tangent_kernel(run.structure)
+    kernel = tangent_kernel(run.structure)
     tangents = np.zeros((len(directions), h_s.size + 1, nx))
     order = sorted(range(len(directions)), key=lambda k: directions[k].first)  # alike lengths share a call
     for k in range(0, len(order), LANES):
@@ -165,7 +165,7 @@ def _motion_slope(orbit: Orbit, path: np.ndarray, stretch: float) -> np.ndarray:
 
 
 @lru_cache(maxsize=32)
-def _tangent_kernel(structure: Structure) -> Kernel:
+def tangent_kernel(structure: Structure) -> Kernel:
     """Return a step of (x, dx), with the change of the step's length as one more valve, and (p, dp)."""
 
     def make() -> ca.Function:
