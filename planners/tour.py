@@ -91,9 +91,14 @@ def _summary(record: dict[str, Any]) -> str:
         f"{gait['pressure_kpa']:.1f} kPa, {best / baseline:.1f} x the published {baseline:.3f} m/s",
         f"- map of {gaits['points']} gaits: up to {gaits['speed_max_m_s']:.3f} m/s, "
         f"radius down to {gaits['radius_min_m']:.3f} m",
-        f"- maze {MAZE}: {plan['status']} by {plan['planner']} in {plan['planning_s']:.2f} s, "
-        f"{plan['length_m']:.2f} m in {plan['duration_s']:.1f} s",
     ]
+    if plan["status"] == "solved":
+        lines.append(
+            f"- maze {MAZE}: solved by {plan['planner']} in {plan['planning_s']:.2f} s, "
+            f"{plan['length_m']:.2f} m in {plan['duration_s']:.1f} s"
+        )
+    else:
+        lines.append(f"- maze {MAZE}: {plan['status']}: {plan['reason']}")
     if execution:
         touched = "without touching a wall" if not execution["collisions"] else "but it touched a wall"
         reached = "reached the goal" if execution["reached"] else "did not reach the goal"

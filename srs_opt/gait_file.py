@@ -13,14 +13,14 @@ from srs_opt.files import read_text
 from srs_opt.gait import Gait
 
 
-def load_gait(path: str, pressure_kpa: float, gait_name: str | None = None) -> Gait:
+def load_gait(path: str, pressure_kpa: float) -> Gait:
     """Read a gait from a file.
 
     Parameters
     ----------
     path : str
-        ``gait.json`` as gait_opt writes it; a gait table, ``gait_table.json:NAME`` choosing the gait; or a
-        schedule ``.csv`` with columns segment, on_s, off_s, period_s.
+        ``gait.json`` as gait_opt writes it; a gait table, ``gait_table.json:NAME`` choosing the gait (default:
+        its first); or a schedule ``.csv`` with columns segment, on_s, off_s, period_s.
     pressure_kpa : float
         Pressure for a schedule, which holds none.
 
@@ -38,15 +38,15 @@ def load_gait(path: str, pressure_kpa: float, gait_name: str | None = None) -> G
     if not isinstance(record, dict):
         raise InputError(f"{file}: expected a mapping with keys frequency_hz, pressure_kpa, switches")
     if "gaits" in record:
-        return _from_table(file, name or gait_name)
+        return _from_table(file, name)
     return _from_result(document)
 
 
-def _from_table(file: str, name: str | None) -> Gait:
+def _from_table(file: str, name: str) -> Gait:
     from srs_opt.gait_opt.table import load_table
 
     table = load_table(file)
-    if name is None:
+    if not name:
         return table.gaits[0].gait
     names = [g.name for g in table.gaits]
     if name not in names:
