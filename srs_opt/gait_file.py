@@ -19,8 +19,8 @@ def load_gait(path: str, pressure_kpa: float) -> Gait:
     Parameters
     ----------
     path : str
-        ``gait.json`` as gait_opt writes it; a gait table, ``gait_table.json:NAME`` choosing the gait (default:
-        its first); or a schedule ``.csv`` with columns segment, on_s, off_s, period_s.
+        ``gait.json`` as gait_opt writes it; a gait table, ``gait_table.json:NAME`` choosing the gait
+        (default: its first); or a schedule ``.csv`` with columns segment, on_s, off_s, period_s.
     pressure_kpa : float
         Pressure for a schedule, which holds none.
 
