@@ -15,6 +15,8 @@ EXAMPLES = (
     "fig8_speed_map",
     "fig9_turning",
     "fig10_circle",
+    "undulation_cost",
+    "drive_factor",
     "best_lag",
     "fastest_gait",
     "tightest_turn",

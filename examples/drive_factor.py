@@ -1,7 +1,7 @@
-"""Speed and radius of turns at offset 0.4 over frequency and pressure (the paper's Fig. 9).
+"""Factors of the drive, measured over simulated, fitted to turns at offset 0.4.
 
-The virtual laboratory measures the same gaits on a robot whose gap is longer than documented; the
-factors that the drive fits to those generated runs play the part of the paper's (l + L_o)/l.
+The virtual laboratory measures them on a robot whose gap is longer than documented; the factors that the
+drive fits to those generated runs play the part of the paper's (l + L_o)/l.
 """
 
 from pathlib import Path
@@ -49,7 +49,7 @@ def main(out: Path = Path("out/examples")) -> float:
     fit = fit_calibration(simulated[0], simulated[1], measured[0], error[0], measured[1], error[1])
     shape = (2, len(PRESSURES_KPA), -1)
     factors = (fit.speed.value, fit.radius.value)
-    draw(simulated.reshape(shape), measured.reshape(shape), factors, out / "fig9_turning")
+    draw(simulated.reshape(shape), measured.reshape(shape), factors, out / "drive_factor")
     robot = wpi_srs()
     print(f"measured over simulated: speed {factors[0]:.3f}, radius {factors[1]:.3f}; ", end="")
     longer = (robot.pitch_m + 0.008) / robot.pitch_m

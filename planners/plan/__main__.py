@@ -18,6 +18,7 @@ PLANNERS = (
     *("auto", "lattice", "rrt", "est", "kpiece"),
     *("dubins-bitstar", "dubins-rrtconnect", "rs-bitstar", "rs-rrtconnect"),
 )
+COSTS = ("time", "length", "clearance", "air")
 MARGIN_M = 0.005
 
 
@@ -61,7 +62,10 @@ def build_parser() -> Parser:
         help="drive.json of a drive calibrated by measurements: its uncertainty widens the margin",
     )
     parser.add_argument(
-        "--best", action="store_true", help="go on looking for faster plans until the time limit"
+        "--cost", choices=COSTS, default="time", help="what the plan shall have little of (default time)"
+    )
+    parser.add_argument(
+        "--best", action="store_true", help="go on looking for better plans until the time limit"
     )
     parser.add_argument(
         "--time-limit", type=positive_float, default=60.0, metavar="S", help="guard, s (default %(default)g)"

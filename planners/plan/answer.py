@@ -41,6 +41,23 @@ class Plan:
         """Length of the way of the centre of mass."""
         return float(np.hypot(*np.diff(self.certificate.pose[:, :2], axis=0).T).sum())
 
+    def cost(self, problem: Problem) -> float:
+        """Return what the plan costs by the problem's price, in seconds of the fastest gait."""
+        c, gaits = self.certificate, np.array(self.gaits)
+        within = [np.flatnonzero(c.cycle == k) for k in range(len(gaits))]
+        poses = [c.pose[max(k[0] - 1, 0) : k[-1] + 1] for k in within if k.size]
+        spares = [np.array([c.room_m[k].min() - problem.margin_m]) for k in within if k.size]
+        whole = zip(gaits[:, None], poses, spares)
+        prices = [float(problem.tariff.of_cycles(g, pose[None], spare)[0]) for g, pose, spare in whole]
+        # of the last cycle only what was played until arrival counts
+        last = problem.motion.period_s[gaits[len(prices) - 1]]
+        left = float(problem.motion.period_s[gaits[: len(prices)]].sum()) - self.duration_s
+        return sum(prices) - prices[-1] * min(left / last, 1.0)
+
+    def air_j(self, problem: Problem) -> float:
+        """Return the energy of the air that the plan's cycles take."""
+        return float(problem.tariff.air_j[list(self.gaits)].sum())
+
     def steps(self, problem: Problem) -> list[dict[str, Any]]:
         """Return the gaits in order, each with the number of cycles that it is held."""
         entries = problem.gaits.gaits
@@ -93,6 +110,8 @@ class PlanResult:
         record["clearance_m"] = plan and round(plan.certificate.clearance_m, 6)
         record["certified"] = bool(plan and plan.certificate.passed)
         record["margin_m"] = problem.margin_m
+        record["cost"] = problem.price
+        record["air_j"] = plan and round(plan.air_j(problem), 4)
         record["steps"] = plan.steps(problem) if plan else []
         record["path"] = plan.path() if plan else []
         record["reason"] = self.reason

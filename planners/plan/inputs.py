@@ -34,7 +34,8 @@ def problem_from(options: argparse.Namespace) -> Problem:
     motion = load_motion(
         robot, gaits, lambda rows: progress(rows, options, "changes of gait (once per gait table)")
     )
-    return Problem(robot, gaits, motion, maze, options.margin + drive_margin_m(options, gaits))
+    margin_m = options.margin + drive_margin_m(options, gaits)
+    return Problem(robot, gaits, motion, maze, margin_m, options.cost)
 
 
 def drive_margin_m(options: argparse.Namespace, gaits: GaitTable) -> float:

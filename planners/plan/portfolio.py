@@ -18,7 +18,7 @@ from multiprocessing import get_context
 
 from planners.plan.answer import Plan, PlanResult
 from planners.plan.certify import certify
-from planners.plan.solve import LatticeSolver
+from planners.plan.solve import BEAM, LatticeSolver
 from planners.search.lattice import LatticeSettings, Step
 from planners.search.problem import Problem
 from srs_opt.processes import workers_deaf_to_interrupts
@@ -30,7 +30,7 @@ FIRST_NODES = 3000  # cycles that the lattice search looks at in the first round
 FIRST_ITERATIONS = 1000  # of an OMPL planner
 ROUNDS = 5
 HALVINGS = 3  # of cells near walls, in the second lattice search
-GREED = (3.0, 2.0, 1.5, 1.2)  # of the searches for better plans
+WIDER = (50, 150, 500, 1500)  # beams that look for better plans
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,11 @@ def _rounds(problem: Problem, wish: Wish, tell: Tell) -> PlanResult:
     lattice = LatticeSolver(problem, time_limit_s=wish.time_limit_s, tell=tell)
     # the second search tells places near walls apart more finely: slower, but it threads needles
     fine = LatticeSolver(
-        problem, LatticeSettings(most_halvings=HALVINGS), time_limit_s=wish.time_limit_s, tell=tell
+        problem,
+        LatticeSettings(most_halvings=HALVINGS),
+        beam=None,
+        time_limit_s=wish.time_limit_s,
+        tell=tell,
     )
     began = time.perf_counter()
     for turn in range(ROUNDS):
@@ -159,17 +163,18 @@ def _certified(problem: Problem, planner: str, gaits: tuple[int, ...] | None) ->
 
 
 def _better(problem: Problem, wish: Wish, result: PlanResult, tell: Tell) -> PlanResult:
-    """Search with less greed as long as there is time; keep the fastest plan."""
+    """Search with wider beams as long as there is time; keep the cheapest plan."""
     began = time.perf_counter()
     best = result
-    for greed in GREED:
+    for width in WIDER:
         left = wish.time_limit_s - (time.perf_counter() - began)
         if left <= 0:
             break
-        settings = LatticeSettings(greed=greed)
-        other = LatticeSolver(problem, settings, time_limit_s=left, tell=tell).run()
-        if other.plan is not None and best.plan is not None and other.plan.duration_s < best.plan.duration_s:
-            tell(f"better: {other.plan.duration_s:.2f} s instead of {best.plan.duration_s:.2f} s")
+        solver = LatticeSolver(problem, beam=replace(BEAM, width=width), time_limit_s=left, tell=tell)
+        other = solver.run()
+        assert best.plan is not None  # the caller has looked
+        if other.plan is not None and other.plan.cost(problem) < best.plan.cost(problem):
+            tell(f"better with a beam of {width}: {other.plan.duration_s:.2f} s, {other.plan.length_m:.2f} m")
             best = other
     return best
 

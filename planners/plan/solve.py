@@ -1,4 +1,4 @@
-"""From a problem to a certified plan with the lattice search, mended where the certificate refuses."""
+"""From a problem to a certified plan: beam, then best-first search, mended where the certificate refuses."""
 
 from __future__ import annotations
 
@@ -9,29 +9,37 @@ from dataclasses import replace
 from planners.plan.answer import Plan, PlanResult, Status
 from planners.plan.certify import Certificate, certify
 from planners.plan.explain import narrower_than_any_gait
+from planners.search.beam import BeamSearch, BeamSettings
 from planners.search.lattice import LatticeSearch, LatticeSettings, Root, at_rest
 from planners.search.problem import ROUNDING_M, Problem
 
 CHUNK = 100  # nodes between looks at the clock
-LOOK_FIRST = 300  # nodes before the widths are looked at: most mazes are solved by then
+LOOK_FIRST = 100  # nodes of the best-first search before the widths are looked at
+TOO_NARROW = "no way: the widest route is too narrow for every gait"
 BACK = 3  # cycles before a failure from where the way is searched again, more at every attempt
 ATTEMPTS = 12
 MORE_SLACK_M = 0.0005
+BEAM = BeamSettings()
 
 
 class LatticeSolver:
-    """Lattice search and certificate, together; can be asked to go on.
+    """Search and certificate, together; can be asked to go on.
 
-    Where the finer simulation of the certificate leads too near to a wall (the search integrates more
-    coarsely), the search begins again a few cycles before, from the finer simulation's state. When nothing
-    is left to look at, the cells are halved once before the maze is said to have no way.
+    A beam looks first: it is quick and its plans are fast, but it may miss the way. Where it does the
+    best-first search looks at everything within reach. Where the finer simulation of the certificate leads
+    too near to a wall (the search integrates more coarsely), the search begins again a few cycles before,
+    from the finer simulation's state. When nothing is left to look at, the cells are halved once before the
+    maze is said to have no way.
 
     Parameters
     ----------
     problem : Problem
     settings : LatticeSettings, optional
+        Of the best-first search.
     root : Root, optional
         Where to begin; at rest at the start without it.
+    beam : BeamSettings or None
+        None leaves the beam out.
     time_limit_s : float
         A guard only: what is found does not depend on it.
     tell : callable
@@ -44,18 +52,20 @@ class LatticeSolver:
         settings: LatticeSettings | None = None,
         root: Root | None = None,
         *,
+        beam: BeamSettings | None = BEAM,
         time_limit_s: float = 30.0,
         tell: Callable[[str], None] = lambda message: None,
     ) -> None:
         self.problem, self.tell = problem, tell
-        self.settings = settings or LatticeSettings()
+        self.settings, self.beam = settings or LatticeSettings(), beam
         self.began, self.time_limit_s = time.perf_counter(), time_limit_s
         self.judged = root is not None  # widths are judged on the whole way only
         self.begin = root or at_rest(problem)
         self.counts = {"expanded": 0, "simulated": 0, "certificates": 0}
         self.kept: tuple[int, ...] = ()
         self.attempts, self.refined = 0, False
-        self.search = LatticeSearch(problem, self.settings, self.begin)
+        self.more_slack_m = 0.0
+        self.search = self._search_from(self.begin)
 
     @property
     def looked_at(self) -> int:
@@ -88,27 +98,36 @@ class LatticeSolver:
             way = self.search.advance(CHUNK)
             if way is not None:
                 return tuple(step.gait for step in way)
-            if not self.judged and self.looked_at >= LOOK_FIRST:
-                self.judged = True
-                if narrower_than_any_gait(self.problem):
-                    return self._answer("infeasible", "no way: the widest route is too narrow for every gait")
+            if self._too_narrow():
+                return self._answer("infeasible", TOO_NARROW)
             if time.perf_counter() - self.began > self.time_limit_s:
                 return self._answer("timeout", f"no plan within the time limit of {self.time_limit_s:g} s")
             if self.looked_at > last:
                 return self._answer("timeout", f"no plan among the first {self.looked_at} cycles looked at")
         return None
 
+    def _too_narrow(self) -> bool:
+        """Judge the widths, once, when the way is not found at once."""
+        if self.judged or self.search.simulated < LOOK_FIRST or isinstance(self.search, BeamSearch):
+            return False
+        self.judged = True
+        return narrower_than_any_gait(self.problem)
+
     def _retreat(self) -> bool:
-        """Begin again from the start, or more finely; return whether there is anything left to try."""
+        """Begin again from the start, more thoroughly; return whether there is anything left to try."""
         if not self.kept:
-            if self.refined:
+            if self.beam is not None:
+                self.tell("the beam died; looking at everything within reach")
+                self.beam = None
+            elif self.refined:
                 return False
-            self.refined = True
-            s = self.settings
-            self.settings = replace(
-                s, cell_m=s.cell_m / 2, course_rad=s.course_rad / 2, speed_m_s=s.speed_m_s / 2
-            )
-            self.tell("nothing left at this resolution; looking again at half of it")
+            else:
+                self.refined = True
+                s = self.settings
+                self.settings = replace(
+                    s, cell_m=s.cell_m / 2, course_rad=s.course_rad / 2, speed_m_s=s.speed_m_s / 2
+                )
+                self.tell("nothing left at this resolution; looking again at half of it")
         self._begin_again((), self.begin)
         return True
 
@@ -120,7 +139,7 @@ class LatticeSolver:
         here = self.begin
         if keep:
             here = Root(certificate.states[keep - 1], gaits[keep - 1], -ROUNDING_M)
-        self.settings = replace(self.settings, slack_m=self.settings.slack_m + MORE_SLACK_M)
+        self.more_slack_m += MORE_SLACK_M
         self._begin_again(gaits[:keep], here)
 
     def _begin_again(self, kept: tuple[int, ...], here: Root) -> None:
@@ -128,7 +147,15 @@ class LatticeSolver:
         self.counts["expanded"] += self.search.expanded
         self.counts["simulated"] += self.search.simulated
         self.kept = kept
-        self.search = LatticeSearch(self.problem, self.settings, here)
+        self.search = self._search_from(here)
+
+    def _search_from(self, here: Root) -> BeamSearch | LatticeSearch:
+        """Return a new search, with the slack that certificates have asked for."""
+        if self.beam is not None:
+            beam = replace(self.beam, slack_m=self.beam.slack_m + self.more_slack_m)
+            return BeamSearch(self.problem, beam, here)
+        settings = replace(self.settings, slack_m=self.settings.slack_m + self.more_slack_m)
+        return LatticeSearch(self.problem, settings, here)
 
     def _answer(self, status: Status, reason: str | None, plan: Plan | None = None) -> PlanResult:
         effort = dict(self.counts)
@@ -146,5 +173,5 @@ def solve_with_lattice(
     max_nodes: int = 400_000,
     tell: Callable[[str], None] = lambda message: None,
 ) -> PlanResult:
-    """Return the first certified plan of the lattice search; see `LatticeSolver`."""
+    """Return the first certified plan of the searches; see :class:`LatticeSolver`."""
     return LatticeSolver(problem, settings, root, time_limit_s=time_limit_s, tell=tell).run(max_nodes)

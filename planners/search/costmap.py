@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -65,8 +66,16 @@ def speed_by_room(table: GaitTable) -> tuple[Array, Array]:
     return reach[order], np.maximum.accumulate(speed[order])
 
 
-def cost_map(field: DistanceField, goal: Goal, table: GaitTable, half_width_m: float) -> CostMap:
-    """Return the time to `goal` for the centre of mass.
+def cost_map(
+    field: DistanceField,
+    goal: Goal,
+    table: GaitTable,
+    half_width_m: float,
+    per_metre: Callable[[Array, Array], Array] = lambda in_time, room: in_time,
+) -> CostMap:
+    """Return the time to `goal` for the centre of mass, or the price that `per_metre` makes of it.
+
+    `per_metre` takes seconds per metre and distances to walls at places, and returns prices per metre.
 
     Nodes nearer to a wall than half the body's width less the little by which the centre of mass of a bent
     body leaves its centre line are blocked.
@@ -85,7 +94,7 @@ def cost_map(field: DistanceField, goal: Goal, table: GaitTable, half_width_m: f
     nodes = np.stack(np.meshgrid(x, y), axis=-1)
     room = field.clearance(nodes)
     reach, speed = speed_by_room(table)
-    slowness = _slowness(room, reach, speed)
+    slowness = per_metre(_slowness(room, reach, speed), room)
     free = room > blocked
     index = np.arange(rows * columns).reshape(rows, columns)
     starts, ends, costs = [], [], []

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planners.maze.places import Goal
-from planners.motion.table import body_in_room
+from planners.search.ahead import motion_lines, remaining
 from planners.search.costmap import BLOCKED_S
 from planners.search.problem import Cycle, Problem
 
@@ -118,7 +118,6 @@ class LatticeSearch:
         self._count = 0
         motion = problem.motion
         first = Cycle(root.state, root.state[None, :3], np.zeros((0, 1, 2)))
-        self._lever = problem.robot.length_m / 2
         self._gaits = np.arange(motion.size)
         self._propose(self._tree.add(-1, root.gait, 0.0, first))
 
@@ -180,29 +179,18 @@ class LatticeSearch:
         state, before = self._tree.cycle[node].state, self._tree.gait[node]
         move = motion.move(state[0], state[1], state[2], before, state[3])
         # every other point and sample decides what is out of the question; the simulation decides the rest
-        lines = motion_lines(problem, before, move.pose)
+        lines = motion_lines(problem, before, move.pose, self._gaits)
         room = problem.body.estimate(lines).min(axis=1)
-        end = move.pose[:, -1]
-        left = self._remaining(end)
+        left = remaining(problem, move.pose[:, -1], move.speed_m_s)
         possible = (room > problem.margin_m - problem.field.error_m) & (left < BLOCKED_S / 2)
         air = np.clip(1 - (room - problem.margin_m) / problem.motion.body_width_m, 0.0, 1.0)
-        spent = self._tree.spent[node] + motion.period_s
+        price = problem.tariff.of_cycles(self._gaits, move.pose, room - problem.margin_m)
+        spent = self._tree.spent[node] + price
         spent = spent + s.change_s * (self._gaits != before) + s.air_s * air
         rank = spent + s.greed * left
         for gait in np.flatnonzero(possible):
             self._count += 1
             heapq.heappush(self._open, (float(rank[gait]), self._count, node, int(gait), float(spent[gait])))
-
-    def _remaining(self, end: Array) -> Array:
-        """Return the estimated time to the goal (s) from poses (gaits, 3): head, middle and tail."""
-        course = end[:, 2] + self.problem.motion.course[:-1]
-        along = self._lever * np.stack([np.cos(course), np.sin(course)], axis=1)
-        where = end[:, :2]
-        points = np.stack([where, where + along, where + 0.5 * along])
-        middle, head, front = self.problem.to_goal.at(points)
-        head = np.where(head < BLOCKED_S, head, middle + 1.0)
-        front = np.where(front < BLOCKED_S, front, middle + 0.5)
-        return np.where(middle < BLOCKED_S, (middle + head + front) / 3, BLOCKED_S)
 
 
 def arrival_index(goal: Goal, pose: Array) -> int | None:
@@ -212,9 +200,3 @@ def arrival_index(goal: Goal, pose: Array) -> int | None:
         if goal.heading_error(float(pose[index, 2])) <= 0:
             return int(index)
     return None
-
-
-def motion_lines(problem: Problem, before: int, pose: Array) -> Array:
-    """Return thinned centre lines (gaits, samples, points, 2) of a cycle of every gait."""
-    body = problem.motion.body[before, :, 2::2, ::4]
-    return body_in_room(body, pose[:, 2::2])

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +17,8 @@ from planners.motion.robots import undelayed
 from planners.motion.table import SAMPLES, MotionTable, body_in_room
 from planners.search.clearance import BodyClearance
 from planners.search.costmap import CostMap, cost_map
+from planners.search.price import Price, Tariff
+from srs_opt.errors import NoAnswerError
 from srs_opt.gait_opt.table import GaitTable
 from srs_opt.model.outline import centre_line_function
 from srs_opt.orbit.steady import integrator
@@ -22,6 +26,7 @@ from srs_opt.robot import Robot
 from srs_opt.simulate.integrate import Integrator
 from srs_opt.simulate.mesh import Mesh
 from srs_opt.simulate.rosenbrock import BODY_STATES
+from srs_opt.simulate.together import together
 
 Array = NDArray[np.float64]
 ROUNDING_M = 1e-6
@@ -46,6 +51,16 @@ class Cycle:
     lines: Array
 
 
+class _Plan(NamedTuple):
+    """How a gait's cycle is integrated: mesh, valves (N-1, phases), parameters, nodes and samples in time."""
+
+    mesh: Mesh
+    valve: Array
+    p: Array
+    time_s: Array
+    at_s: Array
+
+
 @dataclass(frozen=True, eq=False)
 class Problem:
     """What a planner is given.
@@ -58,6 +73,8 @@ class Problem:
     maze : Maze
         With start and goal.
     margin_m : float
+    price : {"time", "length", "clearance", "air"}
+        What shall be small.
     """
 
     robot: Robot
@@ -65,6 +82,7 @@ class Problem:
     motion: MotionTable
     maze: Maze
     margin_m: float
+    price: Price = "time"
 
     def __getstate__(self) -> dict[str, object]:
         """Only what was given goes to other processes: what was worked out may hold compiled code."""
@@ -94,8 +112,18 @@ class Problem:
 
     @cached_property
     def to_goal(self) -> CostMap:
-        """Time to the goal."""
-        return cost_map(self.field, self.goal, self.gaits, self.robot.body_width_m / 2)
+        """Price of the way to the goal (time, where time counts)."""
+        half = self.robot.body_width_m / 2
+
+        def per_metre(in_time: Array, room: Array) -> Array:
+            return self.tariff.per_metre(in_time, room - half - self.margin_m)
+
+        return cost_map(self.field, self.goal, self.gaits, half, per_metre)
+
+    @cached_property
+    def tariff(self) -> Tariff:
+        """Prices of the gaits."""
+        return Tariff.of(self.price, self.robot, self.gaits)
 
     @cached_property
     def start_slack_m(self) -> float:
@@ -110,24 +138,44 @@ class Problem:
         return integrator(undelayed(self.robot), self.gaits.model)
 
     @cached_property
-    def _cycles(self) -> list[tuple[Mesh, Array, Array, Array, Array]]:
+    def _cycles(self) -> list[_Plan]:
         cycles = []
         for entry in self.gaits.gaits:
             durations, valve = entry.gait.phases()
             mesh = Mesh.uniform(durations, STEP_S)
             time = np.concatenate([[0.0], np.cumsum(mesh.h_s)])
             p = self.run.pack(entry.gait.pressure_kpa, entry.gait.frequency_hz)
-            cycles.append((mesh, valve, p, time, np.linspace(0.0, time[-1], SAMPLES + 1)))
+            cycles.append(_Plan(mesh, valve, p, time, np.linspace(0.0, time[-1], SAMPLES + 1)))
         return cycles
 
     def simulate(self, state: Array, gait: int) -> Cycle:
         """Return one cycle of a gait from a state of the dynamic model."""
-        mesh, valve, p, time, at = self._cycles[gait]
-        states, _ = self.run.steps(state, mesh, valve, p)
+        (cycle,) = self.simulate_all([(state, gait)])
+        if cycle is None:
+            raise NoAnswerError(f"the model cannot go on with gait '{self.gaits.gaits[gait].name}'")
+        return cycle
+
+    def simulate_all(self, begins: Sequence[tuple[Array, int]]) -> list[Cycle | None]:
+        """Return one cycle each from several states and gaits, simulated side by side.
+
+        The company makes no difference to a cycle; None stands for one that the model cannot go through.
+        """
+        plans = [self._cycles[gait] for _, gait in begins]
+        searches = [
+            self.run.stepping(state, plan.mesh, plan.valve, plan.p) for (state, _), plan in zip(begins, plans)
+        ]
+        return [
+            None if isinstance(found, NoAnswerError) else self._cycle(state, plan, found[0])
+            for (state, _), plan, found in zip(begins, plans, together(searches))
+        ]
+
+    def _cycle(self, state: Array, plan: _Plan, states: Array) -> Cycle:
+        """Return the cycle that went through `states` (nx, n) after `state`."""
         everything = np.concatenate([state[:, None], states], axis=1)
         n = self.robot.segments
         wanted = [0, 1, 2, *range(BODY_STATES, BODY_STATES + n)]
-        sampled = np.stack([np.interp(at, time, everything[i]) for i in wanted])
+        sampled = np.stack([np.interp(plan.at_s, plan.time_s, everything[i]) for i in wanted])
         pose = sampled[:3].T
-        x, y = (np.asarray(v) for v in centre_line_function(self.run.structure, SAMPLES + 1)(sampled[3:], p))
+        line = centre_line_function(self.run.structure, SAMPLES + 1)
+        x, y = (np.asarray(v) for v in line(sampled[3:], plan.p))
         return Cycle(states[:, -1], pose, body_in_room(np.stack([x.T, y.T], axis=-1), pose))

@@ -102,7 +102,7 @@ class Integrator:
         NoAnswerError
             If the state stops being finite.
         """
-        return alone(self._steps(x, mesh, valve, p))
+        return alone(self.stepping(x, mesh, valve, p))
 
     def run(self, timeline: Timeline, x: np.ndarray, tolerance: float = TOLERANCE_M_S) -> Trajectory:
         """Integrate over a whole timeline from state `x` (the robot's valve delay is applied here).
@@ -152,19 +152,20 @@ class Integrator:
         """
         for _ in range(_REFINEMENTS):
             repeated = mesh.repeated(many, valve.shape[1])
-            states, errors = yield from self._steps(x, repeated, np.tile(valve, many), p)
+            states, errors = yield from self.stepping(x, repeated, np.tile(valve, many), p)
             worst = errors.reshape(many, -1).max(axis=1)
             good = int(np.argmax([*(worst > LOOSE * tolerance), True]))
             if good:
                 kept = good * mesh.h_s.size
                 return states[:, :kept], errors[:kept], mesh, good
             mesh, many = mesh.refined(errors[: mesh.h_s.size], tolerance), 1
-        states, errors = yield from self._steps(x, mesh, valve, p)
+        states, errors = yield from self.stepping(x, mesh, valve, p)
         return states, errors, mesh, 1
 
-    def _steps(
+    def stepping(
         self, x: np.ndarray, mesh: Mesh, valve: np.ndarray, p: np.ndarray
     ) -> Search[tuple[np.ndarray, np.ndarray]]:
+        """Do what `steps` does, as a search: see `together` for many at once."""
         got = yield Stretch(self.kernel, x, mesh, valve, p)
         if not np.isfinite(got.states[:, -1]).all():
             bad = int(np.argmax(~np.isfinite(got.states).all(axis=0)))

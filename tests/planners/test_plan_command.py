@@ -64,6 +64,24 @@ def test_no_way_is_said_quickly_and_where(capsys, tmp_path):
     assert (tmp_path / "why_not.png").exists()
 
 
+def test_costs_get_what_they_ask_for(capsys, tmp_path):
+    answers = {}
+    for cost in ("time", "length", "clearance", "air"):
+        status, answers[cost], _ = run(capsys, tmp_path, MAZES / "rooms.yaml", "--cost", cost)
+        assert status == 0 and answers[cost]["certified"] and answers[cost]["cost"] == cost
+    fast = answers["time"]
+    assert answers["length"]["length_m"] < fast["length_m"]
+    assert answers["clearance"]["clearance_m"] > fast["clearance_m"]
+    assert answers["air"]["air_j"] < 0.9 * fast["air_j"]
+
+
+def test_costs_of_the_command_are_those_of_the_search():
+    from planners.plan.__main__ import COSTS
+    from planners.search.price import PRICES
+
+    assert COSTS == PRICES
+
+
 def test_start_and_goal_in_walls_are_refused_at_once(capsys, tmp_path):
     for option, value in (("--start", "1.0,0.1,0"), ("--goal", "1.0,0.1"), ("--goal", "9,9")):
         status, answer, err = run(capsys, tmp_path, MAZES / "no_way.yaml", option, value)

@@ -1,0 +1,183 @@
+"""Beam search over cycles of gaits: the best few states of every cycle go on, all simulated together.
+
+Not complete, but its plans are faster than those that the best-first search finds as soon: states after
+the same number of cycles are compared by the time that they have taken and the time that they need, so
+nothing has to be greedy. Where the beam dies the best-first search takes over.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from planners.motion.table import SAMPLES
+from planners.search.ahead import motion_lines, remaining
+from planners.search.costmap import BLOCKED_S
+from planners.search.lattice import Root, Step, arrival_index, at_rest
+from planners.search.problem import Cycle, Problem
+
+TOGETHER = 8  # cycles simulated in one go
+FIRST_LOOK = 32  # gaits whose bodies are looked at first, most promising first
+STALLED = 10  # cycles without coming nearer to the goal after which the beam is given up
+
+
+@dataclass(frozen=True)
+class BeamSettings:
+    """Width and resolution.
+
+    Attributes
+    ----------
+    width : int
+        States that go on.
+    brood : int
+        Of one state, so many at most.
+    cell_m, course_rad, speed_m_s : float
+        Cells by which states are told apart: of two in a cell the cheaper goes on.
+    change_s : float
+        Price of changing gait.
+    air_s : float
+        Price of a cycle that just keeps the margin (none where a body width of air is left).
+    slack_m : float
+        Beyond the margin, for what happens between the samples of a cycle.
+    """
+
+    width: int = 16
+    brood: int = 4
+    cell_m: float = 0.03
+    course_rad: float = math.radians(15)
+    speed_m_s: float = 0.1
+    change_s: float = 0.02
+    air_s: float = 0.1
+    slack_m: float = 0.0005
+
+
+class _Offer(NamedTuple):
+    """A cycle that may be begun: rank, parent and gait, price up to its end."""
+
+    rank: float
+    parent: int
+    gait: int
+    spent: float
+
+
+class BeamSearch:
+    """A beam that is driven on until it arrives or dies."""
+
+    def __init__(
+        self, problem: Problem, settings: BeamSettings | None = None, root: Root | None = None
+    ) -> None:
+        root = root or at_rest(problem)
+        self.problem, self.settings = problem, settings or BeamSettings()
+        self.root_slack_m = root.slack_m
+        self.expanded = self.simulated = 0
+        first = Cycle(root.state, root.state[None, :3], np.zeros((0, 1, 2)))
+        self._cycle, self._gait, self._spent, self._parent = [first], [root.gait], [0.0], [-1]
+        self._front = [0]
+        self._cheapest: dict[tuple[int, ...], float] = {}
+        self._best: tuple[float, int] | None = None
+        self._nearest, self._stalled = math.inf, 0
+
+    @property
+    def exhausted(self) -> bool:
+        """Whether the beam has ended (no proof of anything)."""
+        return not self._front
+
+    def advance(self, expansions: int) -> list[Step] | None:
+        """Drive the beam on over about `expansions` states; return the way to the goal when it has ended."""
+        last = self.expanded + expansions
+        while self._front and self.expanded < last:
+            offers = sorted(offer for node in self._front for offer in self._offers(node))
+            nearest = min((offer.rank - offer.spent for offer in offers), default=math.inf)
+            self._stalled = 0 if nearest < self._nearest else self._stalled + 1
+            self._nearest = min(nearest, self._nearest)
+            self._front = self._chosen(offers) if self._stalled < STALLED else []
+        if self._front or self._best is None:
+            return None
+        return self._way_to(self._best[1])
+
+    def _offers(self, node: int) -> list[_Offer]:
+        """Return the cycles that may follow a state, by the motion table."""
+        self.expanded += 1
+        problem, s, motion = self.problem, self.settings, self.problem.motion
+        state, before = self._cycle[node].state, self._gait[node]
+        move = motion.move(state[0], state[1], state[2], before, state[3])
+        left = remaining(problem, move.pose[:, -1], move.speed_m_s)
+        order = np.argsort(left + motion.period_s, kind="stable")
+        order = order[left[order] < BLOCKED_S / 2]
+        offers: list[_Offer] = []
+        for gaits in (order[:FIRST_LOOK], order[FIRST_LOOK:]):
+            lines = motion_lines(problem, before, move.pose, gaits)
+            room = problem.body.estimate(lines).min(axis=1, initial=math.inf)
+            spare = room - problem.margin_m
+            fits = spare > -problem.field.error_m
+            tight = np.clip(1 - spare / motion.body_width_m, 0.0, 1.0)
+            spent = self._spent[node] + problem.tariff.of_cycles(gaits, move.pose[gaits], spare)
+            spent = spent + s.change_s * (gaits != before) + s.air_s * tight
+            rank = spent + left[gaits]
+            offers += [
+                _Offer(float(rank[k]), node, int(gaits[k]), float(spent[k])) for k in np.flatnonzero(fits)
+            ]
+            if len(offers) >= s.brood:
+                break
+        return offers
+
+    def _chosen(self, offers: list[_Offer]) -> list[int]:
+        """Simulate offers, best first, until the front is full again."""
+        s, front = self.settings, []
+        brood: dict[int, int] = {}
+        for first in range(0, len(offers), TOGETHER):
+            batch = [o for o in offers[first : first + TOGETHER] if brood.get(o.parent, 0) < s.brood]
+            if self._best is not None:
+                batch = [o for o in batch if o.rank < self._best[0]]
+                if not batch:
+                    break
+            self.simulated += len(batch)
+            cycles = self.problem.simulate_all([(self._cycle[o.parent].state, o.gait) for o in batch])
+            for offer, cycle in zip(batch, cycles):
+                node = None if cycle is None else self._taken(offer, cycle)
+                if node is not None:
+                    brood[offer.parent] = brood.get(offer.parent, 0) + 1
+                    front.append(node)
+            if len(front) >= s.width:
+                break
+        return front[: s.width]
+
+    def _taken(self, offer: _Offer, cycle: Cycle) -> int | None:
+        """Keep a simulated cycle if it is clear and the cheapest to come here; None too where it arrives."""
+        s, state = self.settings, cycle.state
+        course = (state[2] + self.problem.motion.course[offer.gait]) % (2 * math.pi)
+        key = (
+            math.floor(state[0] / s.cell_m),
+            math.floor(state[1] / s.cell_m),
+            math.floor(course / s.course_rad),
+            math.floor(state[3] / s.speed_m_s + 0.5),
+        )
+        if self._cheapest.get(key, math.inf) <= offer.spent:
+            return None
+        slack = self.root_slack_m if offer.parent == 0 else s.slack_m
+        if not self.problem.body.keeps_margin(cycle.lines, slack):
+            return None
+        self._cheapest[key] = offer.spent
+        self._cycle.append(cycle)
+        self._gait.append(offer.gait)
+        self._spent.append(offer.spent)
+        self._parent.append(offer.parent)
+        node = len(self._gait) - 1
+        arrived = arrival_index(self.problem.goal, cycle.pose)
+        if arrived is None:
+            return node
+        before = self._spent[offer.parent]
+        price = before + (offer.spent - before) * arrived / SAMPLES
+        if self._best is None or price < self._best[0]:
+            self._best = price, node
+        return None
+
+    def _way_to(self, node: int) -> list[Step]:
+        steps = []
+        while self._parent[node] >= 0:
+            steps.append(Step(self._gait[node], self._cycle[node]))
+            node = self._parent[node]
+        return steps[::-1]

@@ -1,0 +1,107 @@
+"""What a plan costs: time, length, nearness to walls, or air; all counted in seconds of the fastest gait.
+
+The search adds up prices of cycles; the map of prices to the goal is made of prices per metre.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from srs_opt.gait_opt.goal import air_work_j, chamber_volume_m3
+from srs_opt.gait_opt.table import GaitTable
+from srs_opt.robot import Robot
+
+Array = NDArray[np.float64]
+Price = Literal["time", "length", "clearance", "air"]
+PRICES: tuple[Price, ...] = get_args(Price)
+TIME_COUNTS = 0.3  # of a second per second where time is not the price: dawdling is never free
+NEAR_WIDTHS, NEAR_FACTOR = 2.0, 3.0  # within so many body widths of air, up to so much dearer
+DEARER = 1.3  # than the cheapest gait, straight and steady, is a metre of way as a rule
+SLOW = 0.1  # of the top speed; slower gaits say nothing of what a metre costs
+
+
+@dataclass(frozen=True, eq=False)
+class Tariff:
+    """Prices of the gaits of a table.
+
+    Attributes
+    ----------
+    price : Price
+    period_s, air_j, speed_m_s : array (gaits,)
+        Of every gait: duration and compressed air of a cycle, mean speed.
+    body_width_m : float
+    """
+
+    price: Price
+    period_s: Array
+    air_j: Array
+    speed_m_s: Array
+    body_width_m: float
+
+    @staticmethod
+    def of(price: Price, robot: Robot, table: GaitTable) -> Tariff:
+        """Return the prices of a table's gaits."""
+        gaits = [entry.gait for entry in table.gaits]
+        volume = chamber_volume_m3(robot)
+        air = [air_work_j(sum(map(len, g.intervals)), g.pressure_kpa, volume) for g in gaits]
+        speed = [abs(entry.speed_m_s) for entry in table.gaits]
+        return Tariff(
+            price, np.array([g.period_s for g in gaits]), np.array(air), np.array(speed), robot.body_width_m
+        )
+
+    @property
+    def start_up(self) -> float:
+        """Return what a start from rest costs more than a flying one: about a second, and more of its air."""
+        return {"length": TIME_COUNTS, "air": 1.5}.get(self.price, 1.0)
+
+    @property
+    def top_speed_m_s(self) -> float:
+        """Speed of the fastest gait."""
+        return float(self.speed_m_s.max())
+
+    @property
+    def _air_w(self) -> float:
+        """Air that the fastest gait takes per second."""
+        fastest = int(self.speed_m_s.argmax())
+        return float(self.air_j[fastest] / self.period_s[fastest])
+
+    def of_cycles(self, gaits: NDArray[np.int64], pose: Array, spare_m: Array) -> Array:
+        """Return the prices (n,) of a cycle of some gaits.
+
+        Parameters
+        ----------
+        gaits : array of int (n,)
+        pose : array (n, samples, 3)
+            Over the cycle.
+        spare_m : array (n,)
+            Clearance beyond the margin.
+        """
+        period = self.period_s[gaits]
+        if self.price == "time":
+            return period
+        if self.price == "clearance":
+            return period * self._nearness(spare_m)
+        if self.price == "length":
+            way = np.hypot(*np.diff(pose[..., :2], axis=-2).transpose(2, 0, 1)).sum(axis=-1)
+            return np.asarray(way / self.top_speed_m_s + TIME_COUNTS * period)
+        return self.air_j[gaits] / self._air_w + TIME_COUNTS * period
+
+    def per_metre(self, in_time: Array, spare_m: Array) -> Array:
+        """Return prices per metre where a metre takes `in_time` seconds and `spare_m` is beside the body."""
+        if self.price == "time":
+            return in_time
+        if self.price == "clearance":
+            return in_time * self._nearness(spare_m)
+        if self.price == "length":
+            return np.full(in_time.shape, 1 / self.top_speed_m_s) + TIME_COUNTS * in_time
+        moving = self.speed_m_s > SLOW * self.top_speed_m_s
+        least = (self.air_j[moving] / (self.speed_m_s[moving] * self.period_s[moving])).min()
+        return DEARER * least / self._air_w + TIME_COUNTS * in_time
+
+    def _nearness(self, spare_m: Array) -> Array:
+        """Return the factor by which nearness to walls makes dearer."""
+        return 1 + NEAR_FACTOR * np.clip(1 - spare_m / (NEAR_WIDTHS * self.body_width_m), 0.0, 1.0)
