@@ -80,7 +80,8 @@ def check_track(
     """Report what is implausible about a track."""
     lost = np.isnan(track.points_m[..., 0])
     if lost.all():
-        report.error(track.file, None, "every marker is lost in every frame: the trial holds no measurement")
+        # the other trials are none the worse for it: fits leave this one out and say so
+        report.warn(track.file, None, "every marker is lost in every frame: the trial holds no measurement")
         return
     good_clock = _check_clock(trial, track, rate_hz, report)
     for marker in np.flatnonzero(lost.all(axis=0)):
