@@ -13,9 +13,10 @@ from virtual_lab.draw import draw_truth
 from virtual_lab.trials import small_design, steps_design
 
 TRUTH = draw_truth((), np.random.default_rng(2))
+USUAL = Recording()
 
 
-def made(folder, recording=Recording(), design=None):
+def made(folder, recording=USUAL, design=None):
     chosen = small_design(np.random.default_rng(3), 2.5)[:6] if design is None else design
     return write_dataset(folder, TRUTH, chosen, 4, recording)
 
@@ -35,7 +36,7 @@ def close(answer, most=4.0):
 @pytest.mark.parametrize(
     ("recording", "design"),
     [
-        (Recording(), None),
+        (USUAL, None),
         (Recording(lost=0.5), None),
         (Recording(markers="centre_of_mass"), None),
         (Recording(bench=True), steps_design(5)),
