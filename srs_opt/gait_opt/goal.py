@@ -48,6 +48,12 @@ class Goal:
             raise InputError("a wanted speed must be above zero; --table also holds the gaits backwards")
 
     @property
+    def only_fast(self) -> bool:
+        """Whether nothing is wanted but speed straight ahead."""
+        wishes = (self.radius_m, self.turn_rate_rad_s, self.envelope_m)
+        return self.objective == "speed" and all(w is None for w in wishes)
+
+    @property
     def tightest(self) -> bool:
         """Whether the smallest radius is sought."""
         return self.objective == "turn" and self.radius_m is None and self.turn_rate_rad_s is None

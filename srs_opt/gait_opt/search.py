@@ -100,7 +100,7 @@ def search(
     own = max(r.friction_speed_m_s for r in problem.robots)
     if warm is None:
         candidates = starting_gaits(problem, starts, seed)
-        rungs = ladder(own)
+        rungs = ladder(own, quick=problem.goal.only_fast)
         cut = max(len([r for r in rungs if r.friction_speed_m_s >= 0.01]), len(rungs) - 2)
         lower, upper = rungs[:cut], rungs[cut:]
     else:
