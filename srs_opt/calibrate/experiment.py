@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from srs_opt.calibrate.cluster import ClusterCrew
     from srs_opt.calibrate.crew import Crew
 
+AT_ONCE = 48  # trials whose motions are in memory together: enough to fill the lanes
 Extra = Callable[[Trial, Prediction], np.ndarray]
 
 
@@ -127,14 +128,14 @@ class Experiment:
         extra: Extra | None = None,
     ) -> dict[str, TrialGram]:
         """Return the Gram matrices of `trials`, simulated side by side in this process."""
-        nodes = together(
-            [self.runs[t.name].search(point.of_trial(t.name), self.tolerance_m_s) for t in trials]
-        )
         found = {}
-        for trial, run in zip(trials, nodes):
-            if isinstance(run, NoAnswerError):
-                raise run
-            found[trial.name] = self._gram(trial, run, point, coordinates, extra)
+        for first in range(0, len(trials), AT_ONCE):
+            some = trials[first : first + AT_ONCE]
+            searches = [self.runs[t.name].search(point.of_trial(t.name), self.tolerance_m_s) for t in some]
+            for trial, nodes in zip(some, together(searches)):
+                if isinstance(nodes, NoAnswerError):
+                    raise nodes
+                found[trial.name] = self._gram(trial, nodes, point, coordinates, extra)
         return found
 
     def _gram(
