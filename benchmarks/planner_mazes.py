@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.section import Section
 from planners.drive.execute import execute
 from planners.generate.passages import braided, perfect
 from planners.maze.maze import Maze
@@ -121,6 +122,47 @@ def report(rows: list[Row], cell_m: float) -> str:
             else ""
         )
     )
+
+
+def run(quick: bool) -> Section:
+    """Return the report of a few mazes per cell size; `main` runs many."""
+    from srs_opt.gait_opt.catalogue import default_table
+
+    robot = wpi_srs()
+    gaits = default_table(robot)
+    motion = load_motion(robot, gaits)
+    size = RobotSize(robot.length_m, robot.body_width_m / 2, 0.005)
+    lines = []
+    for cell_m in (0.36,) if quick else (0.36, 0.27, 0.18):
+        mazes = [contest_maze(seed, cell_m, size) for seed in range(1 if quick else 6)]
+        lines.append(_line([one(robot, gaits, motion, maze, cell_m, drive=not quick) for maze in mazes]))
+    columns = ["cell (m)", "solved", "driven without contact", "planning (processor s), median and most",
+               "length (m)", "duration (s)", "least clearance (mm)"]  # fmt: skip
+    notes = [
+        "Generated mazes of 16 x 16 cells, perfect and braided in turn; lengths and durations are medians."
+    ]
+    return Section("Contest-like mazes", columns, lines, notes)
+
+
+def _line(rows: list[Row]) -> list[str]:
+    solved = [r for r in rows if r.status == "solved"]
+    clean = [r for r in solved if r.reached and not r.collisions]
+    driven = [r for r in solved if r.reached is not None]
+    times = [r.cpu_s for r in rows]
+    found = ["-", "-", "-"]
+    if solved:
+        found = [
+            f"{np.median([r.length_m for r in solved]):.1f}",
+            f"{np.median([r.duration_s for r in solved]):.1f}",
+            f"{1e3 * min(r.clearance_m for r in solved if r.clearance_m is not None):.1f}",
+        ]
+    return [
+        f"{rows[0].cell_m:g}",
+        f"{len(solved)} of {len(rows)}",
+        f"{len(clean)} of {len(driven)}" if driven else "-",
+        f"{np.median(times):.2f}, {max(times):.2f}",
+        *found,
+    ]
 
 
 def main() -> None:

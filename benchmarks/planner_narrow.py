@@ -12,8 +12,11 @@ import argparse
 import random
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
+from benchmarks.section import Section
 from planners.generate.areas import corridor
 from planners.maze.places import RobotSize
 from planners.motion.store import load_motion
@@ -37,6 +40,42 @@ def attempt(problem: Problem, planner: str, iterations: int, seed: int) -> bool:
     return gaits is not None and certify(problem, gaits).passed
 
 
+def run(quick: bool) -> Section:
+    """Return the report of a few widths; `main` asks more seeds and iterations."""
+    planners = ("lattice", "dubins-rrtconnect") if quick else ("lattice", *RIVALS)
+    rows = study((1.6,) if quick else (1.05, 1.3, 1.6, 2.0), 1, 30 if quick else 300, planners)
+    ratios = sorted({row["ratio"] for row in rows})
+    told = {(row["ratio"], row["planner"]): f"{row['solved']}, {row['cpu_s']:.1f} s" for row in rows}
+    lines = [[f"{ratio:g}", *[told[ratio, planner] for planner in planners]] for ratio in ratios]
+    notes = [
+        "A corridor 0.5 m long, its width in what the slimmest straight gait sweeps: certified plans found, "
+        "of one, and processor time. OMPL's planners have the same body and model, and 300 iterations here."
+    ]
+    return Section("Narrow passages", ["width", *planners], lines, notes)
+
+
+def study(
+    ratios: Sequence[float], seeds: int, iterations: int, planners: Sequence[str]
+) -> list[dict[str, Any]]:
+    """Return how many certified plans each planner finds at each width, and its mean processor time."""
+    robot = wpi_srs()
+    gaits = default_table(robot)
+    motion = load_motion(robot, gaits)
+    slimmest = min(sum(e.envelope_m) for e in gaits.gaits if e.radius_m is None)
+    size = RobotSize(robot.length_m, robot.body_width_m / 2, MARGIN_M)
+    rows = []
+    for ratio in ratios:
+        for planner in planners:
+            solved, cpu = 0, time.process_time()
+            for seed in range(seeds):
+                maze = corridor(0.3, ratio * slimmest, 0.5, random.Random(seed), size)
+                solved += attempt(Problem(robot, gaits, motion, maze, MARGIN_M), planner, iterations, seed)
+            cpu = (time.process_time() - cpu) / seeds
+            rows.append({"ratio": ratio, "planner": planner, "solved": solved, "cpu_s": cpu})
+            print(rows[-1], file=sys.stderr, flush=True)
+    return rows
+
+
 def main() -> None:
     """Run the suite and print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -45,28 +84,13 @@ def main() -> None:
     parser.add_argument("--iterations", type=int, default=1000)
     parser.add_argument("--out", type=Path, default=Path("out/benchmarks/planner_narrow.json"))
     options = parser.parse_args()
-    robot = wpi_srs()
-    gaits = default_table(robot)
-    motion = load_motion(robot, gaits)
-    slimmest = min(sum(e.envelope_m) for e in gaits.gaits if e.radius_m is None)
-    size = RobotSize(robot.length_m, robot.body_width_m / 2, MARGIN_M)
-    print(f"slimmest straight gait sweeps {slimmest:.4f} m; solved of {options.seeds}, mean CPU s")
-    print("ratio   width  " + "".join(f"{name:>20}" for name in ("lattice", *RIVALS)))
-    rows = []
+    planners = ("lattice", *RIVALS)
+    rows = study(options.ratios, options.seeds, options.iterations, planners)
+    print(f"solved of {options.seeds}, mean CPU s")
+    print("ratio  " + "".join(f"{name:>20}" for name in planners))
     for ratio in options.ratios:
-        line = f"{ratio:5.2f}  {ratio * slimmest:.4f} "
-        for planner in ("lattice", *RIVALS):
-            solved, cpu = 0, time.process_time()
-            for seed in range(options.seeds):
-                maze = corridor(0.3, ratio * slimmest, 0.5, random.Random(seed), size)
-                solved += attempt(
-                    Problem(robot, gaits, motion, maze, MARGIN_M), planner, options.iterations, seed
-                )
-            cpu = (time.process_time() - cpu) / options.seeds
-            rows.append({"ratio": ratio, "planner": planner, "solved": solved, "cpu_s": cpu})
-            line += f"{solved:>12d} {cpu:6.2f}s"
-            print(rows[-1], file=sys.stderr, flush=True)
-        print(line, flush=True)
+        cells = (f"{r['solved']:>12d} {r['cpu_s']:6.2f}s" for r in rows if r["ratio"] == ratio)
+        print(f"{ratio:5.2f}  " + "".join(cells))
     write_json(options.out, rows)
 
 
