@@ -8,12 +8,14 @@ when begun at different speeds; from each of them every gait is simulated for a 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from planners.motion.table import SAMPLES, MotionTable
+from srs_opt.errors import NoAnswerError
 from srs_opt.gait_opt.table import GaitTable, TableGait
 from srs_opt.model.outline import centre_line_function
 from srs_opt.orbit.solve import periodic_actuators
@@ -22,6 +24,7 @@ from srs_opt.robot import Robot
 from srs_opt.simulate.integrate import Integrator
 from srs_opt.simulate.mesh import Mesh
 from srs_opt.simulate.rosenbrock import BODY_STATES, VELOCITY
+from srs_opt.simulate.together import Search, together
 
 LEVELS = 8  # forward speeds per gait before
 STEP_S = 0.003  # 1e-4 of the distance travelled in a cycle
@@ -45,6 +48,9 @@ class Transitions(NamedTuple):
     kappa: NDArray[np.float32]
 
 
+_Outcome = tuple[np.ndarray, np.ndarray, np.ndarray]
+
+
 class _Cycle:
     """One gait, ready to be simulated for a cycle from any state."""
 
@@ -57,11 +63,11 @@ class _Cycle:
         self.at = np.linspace(0.0, self.time[-1], SAMPLES + 1)
         self.run = run
 
-    def __call__(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the last state, poses (SAMPLES + 1, 3) and curvatures (SAMPLES + 1, N-1)."""
+    def __call__(self, state: np.ndarray) -> Search[_Outcome]:
+        """Find, as a search, the last state, poses (SAMPLES + 1, 3) and curvatures (SAMPLES + 1, N-1)."""
         x = state.copy()
         x[:3] = 0.0
-        states, _ = self.run.steps(x, self.mesh, self.valve, self.p)
+        states, _ = yield from self.run.stepping(x, self.mesh, self.valve, self.p)
         all_states = np.concatenate([x[:, None], states], axis=1)
         n = self.run.structure.segments
         wanted = [0, 1, 2, *range(BODY_STATES, BODY_STATES + n)]
@@ -93,9 +99,11 @@ def simulate_transitions(robot: Robot, table: GaitTable, progress: Progress = it
             [run.rest()] * LEVELS if before == n else _ends(run, table.gaits[before], cycles[before], levels)
         )
         speed[before] = [state[VELOCITY][0] for state in ends]
-        for now, cycle in enumerate(cycles):
-            for level, start in enumerate(ends[:1] if before == n else ends):
-                last, pose[before, now, level], kappa[before, now] = cycle(start)
+        starts = ends[:1] if before == n else ends
+        outcomes = iter(_all([cycle(start) for cycle in cycles for start in starts]))
+        for now in range(n):
+            for level, (last, *way) in enumerate(islice(outcomes, len(starts))):
+                pose[before, now, level], kappa[before, now] = way
                 after[before, now, level] = last[VELOCITY][0]
     # from rest there is one speed only: equal levels, spaced so that they can be looked up
     speed[n] = np.linspace(-1e-3, 1e-3, LEVELS)
@@ -126,11 +134,29 @@ def _ends(run: Integrator, entry: TableGait, cycle: _Cycle, speeds: np.ndarray) 
     """Return the states in which one cycle of a gait ends when begun at different forward speeds."""
     start = run.rest()
     start[BODY_STATES:] = periodic_actuators(run, entry.gait, cycle.p)
-    ends = []
+    begun = []
     for speed in speeds:
-        start[VELOCITY] = speed, 0.0, 0.0
-        ends.append(cycle(start)[0])
+        state = start.copy()
+        state[VELOCITY] = speed, 0.0, 0.0
+        begun.append(cycle(state))
+    ends = [last for last, *_ in _all(begun)]
     return sorted(ends, key=lambda state: float(state[VELOCITY][0]))
+
+
+def _all(searches: list[Search[_Outcome]]) -> list[_Outcome]:
+    """Return what came of cycles simulated side by side.
+
+    Raises
+    ------
+    NoAnswerError
+        If one of them cannot be gone through.
+    """
+    outcomes = []
+    for outcome in together(searches):
+        if isinstance(outcome, NoAnswerError):
+            raise outcome
+        outcomes.append(outcome)
+    return outcomes
 
 
 def _bodies(run: Integrator, table: GaitTable, kappa: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ from typing import Any
 
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait, published_wave
-from srs_opt.gait_opt.aim import aimed, end_for_end
+from srs_opt.gait_opt.aim import aimed, end_for_end, in_step
 from srs_opt.gait_opt.collocation.problem import CycleProblem
 from srs_opt.gait_opt.finish import finished
 from srs_opt.gait_opt.goal import Goal, Limits
@@ -99,7 +99,8 @@ def _fulfil(work: Work, task: Task) -> dict[str, Any]:
     problem = CycleProblem((work.robot,), work.model, goal, work.limits)
     try:
         found = _solve(problem, task)
-        gaits = images(work.robot, work.model, wish.name, finished(problem, found.gait))
+        gait = finished(problem, found.gait)
+        gaits = images(work.robot, work.model, wish.name, gait, work.limits.tick_s)
     except NoAnswerError as error:
         return {"gaits": [], "next": None, "line": f"{wish.name}: left out, {error}"}
     entry = gaits[0]
@@ -137,17 +138,23 @@ def _solve(problem: CycleProblem, task: Task) -> Climb:
     return found
 
 
-def images(robot: Robot, model: str, name: str, gait: Gait) -> list[TableGait]:
-    """Return the gait and its images: turning right, and both backwards; straight ones only backwards."""
-    forward = steady_gait(robot, gait, model)
-    backward = steady_gait(robot, end_for_end(gait), model)
+def images(robot: Robot, model: str, name: str, gait: Gait, tick_s: float) -> list[TableGait]:
+    """Return the gait and its images: turning right, and both backwards; straight ones only backwards.
+
+    All are in step with each other, so that changing from one to another disturbs the motion least.
+    """
+
+    def orbit(image: Gait) -> Orbit:
+        return steady_gait(robot, in_step(image, tick_s), model)
+
+    forward, backward = orbit(gait), orbit(end_for_end(gait))
     straight = abs(forward.turn_rate_rad_s) < _STRAIGHT_RAD_S
     made: list[tuple[str, Orbit]] = [(name if straight else f"{name} left", forward)]
     if not straight:
-        made.append((f"{name} right", steady_gait(robot, gait.mirrored(), model)))
+        made.append((f"{name} right", orbit(gait.mirrored())))
     made.append((f"{name} back" if straight else f"{name} back {_side(backward)}", backward))
     if not straight:
-        other = steady_gait(robot, end_for_end(gait.mirrored()), model)
+        other = orbit(end_for_end(gait.mirrored()))
         made.append((f"{name} back {_side(other)}", other))
     return [TableGait.of_orbit(n, o) for n, o in made]
 
