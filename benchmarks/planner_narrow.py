@@ -43,13 +43,13 @@ def attempt(problem: Problem, planner: str, iterations: int, seed: int) -> bool:
 def run(quick: bool) -> Section:
     """Return the report of a few widths; `main` asks more seeds and iterations."""
     planners = ("lattice", "dubins-rrtconnect") if quick else ("lattice", *RIVALS)
-    rows = study((1.6,) if quick else (1.05, 1.3, 1.6, 2.0), 1, 30 if quick else 300, planners)
+    rows = study((1.6,) if quick else (1.05, 1.3, 1.6, 2.0), 1, 30 if quick else 1000, planners)
     ratios = sorted({row["ratio"] for row in rows})
     told = {(row["ratio"], row["planner"]): f"{row['solved']}, {row['cpu_s']:.1f} s" for row in rows}
     lines = [[f"{ratio:g}", *[told[ratio, planner] for planner in planners]] for ratio in ratios]
     notes = [
         "A corridor 0.5 m long, its width in what the slimmest straight gait sweeps: certified plans found, "
-        "of one, and processor time. OMPL's planners have the same body and model, and 300 iterations here."
+        "of one, and processor time. OMPL's planners have the same body and model, and 1000 iterations."
     ]
     return Section("Narrow passages", ["width", *planners], lines, notes)
 
