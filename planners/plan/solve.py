@@ -173,5 +173,5 @@ def solve_with_lattice(
     max_nodes: int = 400_000,
     tell: Callable[[str], None] = lambda message: None,
 ) -> PlanResult:
-    """Return the first certified plan of the searches; see :class:`LatticeSolver`."""
+    """Return the first certified plan of the searches; see `LatticeSolver`."""
     return LatticeSolver(problem, settings, root, time_limit_s=time_limit_s, tell=tell).run(max_nodes)
