@@ -21,6 +21,7 @@ from planners.search.problem import Cycle, Problem
 
 TOGETHER = 8  # cycles simulated in one go
 FIRST_LOOK = 32  # gaits whose bodies are looked at first, most promising first
+NARROW, WIDE, WIDTH_TIMES_S = 6, 16, 100.0  # widths of beams, and width times seconds to go
 STALLED = 10  # cycles without coming nearer to the goal after which the beam is given up
 
 
@@ -30,8 +31,8 @@ class BeamSettings:
 
     Attributes
     ----------
-    width : int
-        States that go on.
+    width : int, optional
+        States that go on; without, few on a long way and more on a short one.
     brood : int
         Of one state, so many at most.
     cell_m, course_rad, speed_m_s : float
@@ -44,7 +45,7 @@ class BeamSettings:
         Beyond the margin, for what happens between the samples of a cycle.
     """
 
-    width: int = 16
+    width: int | None = None
     brood: int = 4
     cell_m: float = 0.03
     course_rad: float = math.radians(15)
@@ -79,6 +80,8 @@ class BeamSearch:
         self._cheapest: dict[tuple[int, ...], float] = {}
         self._best: tuple[float, int] | None = None
         self._nearest, self._stalled = math.inf, 0
+        to_go_s = float(problem.to_goal.at(root.state[None, :2])[0]) + 0.1
+        self._width = self.settings.width or round(min(max(WIDTH_TIMES_S / to_go_s, NARROW), WIDE))
 
     @property
     def exhausted(self) -> bool:
@@ -141,9 +144,9 @@ class BeamSearch:
                 if node is not None:
                     brood[offer.parent] = brood.get(offer.parent, 0) + 1
                     front.append(node)
-            if len(front) >= s.width:
+            if len(front) >= self._width:
                 break
-        return front[: s.width]
+        return front[: self._width]
 
     def _taken(self, offer: _Offer, cycle: Cycle) -> int | None:
         """Keep a simulated cycle if it is clear and the cheapest to come here; None too where it arrives."""
