@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from srs_opt.calibrate.coordinates import SCATTER_SD, Coordinate, base_coordinates
+from srs_opt.calibrate.coordinates import FRICTION_SPEED, SCATTER_SD, Coordinate, base_coordinates
 from srs_opt.calibrate.experiment import Experiment, Point
 from srs_opt.calibrate.fit import fit, priors, start_point, sum_eliminated
 from srs_opt.calibrate.gram import TrialGram, solve
@@ -166,5 +166,8 @@ def _sd_with_tracks(
     experiment = Experiment(Model(dataset.robot, model), trials, dataset.marker_sd_m)
     total = sum_eliminated(experiment.grams(point, base)) * (len(dataset.maps) / len(rows))
     covariance = solve(total, range(len(base)), *priors(base, point)).covariance
-    values = {c.name: getattr(dataset.robot, c.name) * math.exp(point.values[c.name]) for c in base}
-    return {c.name: values[c.name] * float(s) for c, s in zip(base, np.sqrt(np.diag(covariance)))}
+    return {
+        c.name: getattr(dataset.robot, c.name) * math.exp(point.values[c.name]) * float(sd)
+        for c, sd in zip(base, np.sqrt(np.diag(covariance)))
+        if c.name != FRICTION_SPEED
+    }

@@ -45,6 +45,7 @@ def test_maps_find_the_truth_and_say_how_much_less_they_know(tmp_path, capsys):
     answer = json.loads(capsys.readouterr().out)
     assert answer["data"] == "maps"
     assert answer["misfit"]["after"] < 1.5
+    assert set(answer["sd_with_tracks"]) == set(answer["sd"])
     for name, value in answer["parameters"].items():
         assert abs(value - getattr(truth.parameters, name)) < 3.5 * answer["sd"][name], name
         assert answer["sd_with_tracks"][name] < answer["sd"][name]
