@@ -89,11 +89,16 @@ class Explanation:
             return " ".join(said).strip() + "."
         if t.width_m < self.body_needs_m:
             said.append(
-                f"No gait at all would fit: the body and its margins are {self.body_needs_m:.3f} m wide."
+                f"No gait at all would fit: the body and its margins are {self.body_needs_m:.3f} m wide. "
+                "That is a proof."
             )
-        elif self.outside_needs_m is not None:
+            return " ".join(said).strip()
+        if self.outside_needs_m is not None:
             verb = "would fit" if self.outside_needs_m <= t.width_m else "would not fit either"
             said.append(f"A weaker gait outside the table needs {self.outside_needs_m:.3f} m and {verb}.")
+        else:
+            said.append("None of the weaker gaits that were tried outside the table moves the robot.")
+        said.append("Gaits are judged by what they sweep in their steady state.")
         return " ".join(said).strip()
 
     def to_record(self) -> dict[str, Any]:

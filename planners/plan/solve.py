@@ -15,7 +15,7 @@ from planners.search.problem import ROUNDING_M, Problem
 
 CHUNK = 100  # nodes between looks at the clock
 LOOK_FIRST = 100  # nodes of the best-first search before the widths are looked at
-TOO_NARROW = "no way: the widest route is too narrow for every gait"
+TOO_NARROW = "no way with these gaits: even the widest route is too narrow for every gait of the table"
 BACK = 3  # cycles before a failure from where the way is searched again, more at every attempt
 ATTEMPTS = 12
 MORE_SLACK_M = 0.0005
