@@ -24,7 +24,6 @@ from planners.search.problem import Problem
 from srs_opt.processes import workers_deaf_to_interrupts
 
 CONTROL = ("rrt", "est", "kpiece")
-GEOMETRIC = ("dubins-bitstar", "dubins-rrtconnect", "rs-bitstar", "rs-rrtconnect")
 PLANNERS = ("lattice", "dubins-rrtconnect", "rs-rrtconnect", "kpiece", "est", "rrt")
 FIRST_NODES = 3000  # cycles that the lattice search looks at in the first round; doubled every round
 FIRST_ITERATIONS = 1000  # of an OMPL planner

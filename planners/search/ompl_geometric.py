@@ -19,7 +19,6 @@ from planners.search.ompl_setup import counted, seeded
 from planners.search.problem import Problem
 
 Array = NDArray[np.float64]
-NAMES = ("dubins-bitstar", "dubins-rrtconnect", "rs-bitstar", "rs-rrtconnect")
 STEP_M = 0.02  # between the poses at which a path is checked and given back
 STRIP_POINTS = 7
 
@@ -55,7 +54,7 @@ def search_geometric(problem: Problem, planner: str, iterations: int, seed: int)
     Parameters
     ----------
     problem : Problem
-    planner : one of NAMES
+    planner : {"dubins-bitstar", "dubins-rrtconnect", "rs-bitstar", "rs-rrtconnect"}
     iterations : int
         After how many the planner gives up.
     seed : int
