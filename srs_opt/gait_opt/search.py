@@ -105,7 +105,10 @@ def search(
         lower, upper = rungs[:cut], rungs[cut:]
     else:
         candidates, lower = [steered(problem, within(problem.limits, warm))], ()
-        upper = (Rung(max(own, 0.004), 64, _WARM_REACH, 2), Rung(own, 80, _WARM_REACH / 2, 2))
+        quick = problem.goal.only_fast
+        upper = (Rung(max(own, 0.004), 64, _WARM_REACH, 2, quick),)
+        if not quick:
+            upper += (Rung(own, 80, _WARM_REACH / 2, 2),)
     climbing = _Climbing(problem, len(candidates), say)
     climbs, interrupted = _all(climbing, list(enumerate(candidates)), lower, where)
     if not climbs:

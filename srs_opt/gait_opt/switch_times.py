@@ -17,7 +17,7 @@ from srs_opt.gait_opt.ladder import Report, Rung, Step, bounded, orbits_of
 from srs_opt.gait_opt.score import Score, score
 from srs_opt.orbit.steady import Orbit
 
-_IPOPT = {"mu_strategy": "monotone", "mu_init": 1e-3, "max_iter": 100}
+_IPOPT = {"mu_strategy": "monotone", "mu_init": 1e-4, "max_iter": 100}
 _ROUNDS = 4
 _ELEMENTS = 90
 _MOST_ELEMENTS = 160
@@ -52,7 +52,7 @@ def optimize_switch_times(
     order = switch_order(_switches(gait))
     counts = element_counts(_switches(gait), order, _ELEMENTS)
     for _ in range(_ROUNDS):
-        trial, step, met, finer = _solve(problem, gait, orbits, order, counts, reach)
+        trial, step, met, finer, binding = _solve(problem, gait, orbits, order, counts, reach)
         try:
             trial_orbits = orbits_of(problem, trial)
         except NoAnswerError:
@@ -68,7 +68,8 @@ def optimize_switch_times(
             gait, orbits, best = trial, trial_orbits, found
         if report is not None:
             report(step, best)
-        if gain <= _GAINED and met is None and (finer == counts).all() and not step.trouble:
+        settled = met is None and (finer == counts).all() and not step.trouble
+        if settled and (gain <= _GAINED or not binding):
             break
         counts = finer
         if gain > 0 and met is not None:
@@ -90,15 +91,23 @@ def _solve(
     order: np.ndarray,
     counts: np.ndarray,
     reach: float,
-) -> tuple[Gait, Step, np.ndarray | None, np.ndarray]:
-    """Solve once; return the gait, the step, the exchanged order (if switches met), the refined counts."""
+) -> tuple[Gait, Step, np.ndarray | None, np.ndarray, bool]:
+    """Solve once.
+
+    Returns
+    -------
+    gait, step
+    order : the exchanged one, None if no switches met
+    counts : refined
+    binding : whether the gait wanted to move further than `reach`
+    """
     own = max(r.friction_speed_m_s for r in problem.robots)
     mesh, times = phase_times(_switches(gait), order, counts)
     p = problem.program(mesh.elements, times)
     z, scales = unknowns_from_orbits(p.layout, list(problem.robots), list(orbits), mesh)
     z[p.layout.merit] = score(problem, gait, orbits).merit
     parameters = problem.parameters(p, mesh, scales, own)
-    unknowns, rows, _ = bounded(problem, p, z, reach)
+    unknowns, rows, binding = bounded(problem, p, z, reach)
     solution = p.solve(z, parameters, unknowns, rows, options=_IPOPT)
     trial = gait_from(p.layout, solution.z)
     speed = float(solution.z[p.layout.unknown(0, "speed")])
@@ -110,4 +119,5 @@ def _solve(
     finer = counts
     if mesh.elements < _MOST_ELEMENTS:
         finer = refined_counts(defect, counts, _DEFECT)
-    return trial, step, exchanged(solution.z[2 : 2 + p.layout.switches], order), finer
+    met = exchanged(solution.z[2 : 2 + p.layout.switches], order)
+    return trial, step, met, finer, binding(solution.z)
