@@ -7,9 +7,13 @@ from the balance of forces and moments at every instant.
 import casadi as ca
 import numpy as np
 import pytest
+from scipy.optimize import brentq, minimize_scalar
 
+from srs_opt.gait import Wave
+from srs_opt.model.friction import FRICTION_LAWS
 from srs_opt.model.parameters import Structure
 from srs_opt.model.registry import build
+from srs_opt.orbit.steady import steady_gait
 from srs_opt.robot import wpi_srs
 
 
@@ -99,6 +103,50 @@ def test_the_tables_amplitude_is_about_the_best(eps, ratio, amplitude):
     assert chain.speed_ratio(1.3 * amplitude, 4) < best
 
 
+def infinite_wave(amplitude, eps, points=200):
+    """Return (speed over the wave's along the arc, friction work over the least possible, mu_t m g d).
+
+    Headings amplitude cos(k s), the body sliding along its path at speed 1 while the path itself slips
+    backwards at w; the slip is where the model's own friction law balances along the way.
+    """
+    v_t, v_n = ca.SX.sym("v_t"), ca.SX.sym("v_n")
+    law = ca.Function("law", [v_t, v_n], list(FRICTION_LAWS["cone"](v_t, v_n, 1e-6))).map(points)
+    heading = amplitude * np.cos(2 * np.pi * (np.arange(points) + 0.5) / points)
+    c, s = np.cos(heading), np.sin(heading)
+
+    def forces(slip):
+        along, across = 1 - slip * c, slip * s
+        d_t, d_n = (np.asarray(d).ravel() for d in law(along[None], across[None]))
+        return along, across, eps * d_t, d_n
+
+    def drag(slip):
+        _, _, f_t, f_n = forces(slip)
+        return np.mean(f_t * c - f_n * s)
+
+    slip = brentq(drag, 1e-9, 1.0)
+    along, across, f_t, f_n = forces(slip)
+    speed = c.mean() - slip
+    return speed, np.mean(f_t * along + f_n * across) / (eps * speed)
+
+
+@pytest.mark.parametrize(("eps", "ratio", "amplitude"), TABLE)
+def test_friction_law_gives_the_infinite_waves_table(eps, ratio, amplitude):
+    assert infinite_wave(amplitude, eps)[0] == pytest.approx(ratio, abs=0.002)
+    for other in (0.95 * amplitude, 1.05 * amplitude):
+        assert infinite_wave(other, eps)[0] < infinite_wave(amplitude, eps)[0] + 1e-4
+
+
+def test_most_efficient_amplitude_falls_as_the_fourth_root():
+    """Alben (2013): as mu_n^(-1/4), the limit of large mu_n over mu_t."""
+    ratios = np.array([1e-3, 1e-4, 1e-5])
+    best = [
+        minimize_scalar(lambda a, e=eps: infinite_wave(a, e)[1], bounds=(0.01, 1.0), method="bounded").x
+        for eps in ratios
+    ]
+    slopes = np.diff(np.log(best)) / np.diff(np.log(ratios))
+    assert slopes == pytest.approx(0.25, abs=0.01)
+
+
 def test_best_lag_of_five_links_in_the_viscous_limit():
     """Small amplitude, viscous friction, negligible inertia: 50.6 degrees between segments."""
     robot = wpi_srs().with_values(
@@ -126,3 +174,21 @@ def test_best_lag_of_five_links_in_the_viscous_limit():
     a, b, _ = np.polyfit(lags[k - 1 : k + 2], values[k - 1 : k + 2], 2)
     assert np.degrees(-b / (2 * a)) == pytest.approx(50.6, abs=0.5)
     assert values[k] > 0
+
+
+def test_best_lag_of_steady_gaits_in_the_viscous_limit():
+    """The same by the simulated valves: slow actuators leave little of the square wave's harmonics."""
+    robot = wpi_srs().with_values(
+        friction_law="cone",
+        friction_speed_m_s=0.1,
+        link_inertia_kg_m2=0.0,
+        gap_length_m=0.0,
+        tau1_s=10.0,
+        tau2_s=9.0,
+    )
+    lags = np.radians([48.0, 50.0, 52.0, 54.0])
+    speeds = [
+        steady_gait(robot, Wave.uniform(4, 0.1, 60, lag).gait(), tolerance=1e-8).speed_m_s for lag in lags
+    ]
+    a, b, _ = np.polyfit(lags, speeds, 2)
+    assert np.degrees(-b / (2 * a)) == pytest.approx(50.6, abs=0.7)
