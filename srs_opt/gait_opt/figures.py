@@ -159,8 +159,8 @@ def draw_convergence(found: Found, stem: Path) -> tuple[Path, Path]:
         number, [max(s.relative_error, 1e-6) for s in steps], "s-", color=COLOURS[2], markersize=4
     )
     bottom.axhline(0.005, color="black", linewidth=0.8, linestyle="--")
-    bottom.set(ylabel="relative error", xlabel="smoothing speed of friction (m/s), elements")
-    bottom.set_xticks(number, [f"{s.rung.friction_speed_m_s:g}\n{s.elements}" for s in steps])
+    bottom.set(ylabel="relative error", xlabel="smoothing speed of friction (mm/s), elements")
+    bottom.set_xticks(number, [f"{_MM * s.rung.friction_speed_m_s:g}\n{s.elements}" for s in steps])
     return save_figure(figure, stem)
 
 

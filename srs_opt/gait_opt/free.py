@@ -48,8 +48,8 @@ class FreeResult:
         The better of wave and rounded gait, with its certificate.
     wave_m_s : float
         Speed of the wave gait.
-    rounded_m_s : float or None
-        Speed of the best gait with K intervals (None: none was found).
+    rounded : Found or None
+        The best gait with K intervals (None: none was found).
     rounded_intervals : tuple of int
         Intervals per segment after rounding, before any were added to make K.
     relaxation : Relaxation
@@ -57,22 +57,23 @@ class FreeResult:
 
     found: Found
     wave_m_s: float
-    rounded_m_s: float | None
+    rounded: Found | None
     rounded_intervals: tuple[int, ...]
     relaxation: Relaxation
 
     def record(self) -> dict[str, Any]:
         """Return what the command adds to its JSON."""
-        gait = self.found.gait
+        best = self.rounded
+        speed = None if best is None else best.certificate.speed_m_s
         return {
             "wave_speed_m_s": self.wave_m_s,
-            "speed_m_s": self.rounded_m_s,
-            "gain": None if self.rounded_m_s is None else self.rounded_m_s / self.wave_m_s - 1,
+            "speed_m_s": speed,
+            "gain": None if speed is None else speed / self.wave_m_s - 1,
             "relaxed_speed_m_s": self.relaxation.speed_m_s,
             "relaxed_friction_speed_m_s": SMOOTHED_M_S,
             "intervals_after_rounding": list(self.rounded_intervals),
-            "switches_per_s": gait.switches_per_s,
-            "shortest_dwell_s": gait.shortest_dwell_s(),
+            "switches_per_s": None if best is None else best.gait.switches_per_s,
+            "shortest_dwell_s": None if best is None else best.gait.shortest_dwell_s(),
         }
 
 
@@ -96,16 +97,20 @@ def search_free(
     candidates = [gait]
     if problem.intervals > 1:
         candidates.append(_wave_with_notches(problem, wave.gait))
-    best, speed = wave, None
+    best, free = wave, None
     for candidate in candidates:
         found = _refined(problem, candidate, wave, say)
         if found is None:
             continue
-        speed = max(found.certificate.speed_m_s, speed or 0.0)
-        totals = [score(problem, f.gait, f.orbits).total for f in (found, best)]
-        if found.certificate.passed and totals[0] > totals[1]:
+        if free is None or _total(problem, found) > _total(problem, free):
+            free = found
+        if found.certificate.passed and _total(problem, found) > _total(problem, best):
             best = found
-    return FreeResult(best, wave.certificate.speed_m_s, speed, counts, relaxation)
+    return FreeResult(best, wave.certificate.speed_m_s, free, counts, relaxation)
+
+
+def _total(problem: CycleProblem, found: Found) -> float:
+    return score(problem, found.gait, found.orbits).total
 
 
 def _refined(problem: CycleProblem, gait: Gait, wave: Found, say: Callable[[str], None]) -> Found | None:
