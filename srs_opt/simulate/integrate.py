@@ -202,15 +202,7 @@ def _pieces(timeline: Timeline, longest_phases: int = 40) -> list[Timeline]:
         )
         full = elapsed >= 1 / timeline.frequency_hz[start] - 1e-9 or k - start >= longest_phases
         if k == n or changed or full:
-            cut = slice(start, k)
-            pieces.append(
-                Timeline(
-                    timeline.duration_s[cut],
-                    timeline.valve[:, cut],
-                    timeline.pressure_kpa[cut],
-                    timeline.frequency_hz[cut],
-                )
-            )
+            pieces.append(timeline.part(slice(start, k)))
             start, elapsed = k, 0.0
     return pieces
 
