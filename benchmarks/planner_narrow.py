@@ -1,97 +1,119 @@
 """Narrow passages: success against width, beside OMPL's planners alone with the same body and model.
 
-python -m benchmarks.planner_narrow [--ratios 1.05 1.15 1.3 1.6 2.0] [--seeds 2] [--iterations 1000]
+python -m benchmarks.planner_narrow [--ratios 1.05 1.15 1.3 1.6 2.0] [--sets 2] [--jobs 2]
 
-Widths are multiples of what the table's slimmest straight gait sweeps. Every planner's way passes the
-same certificate before it counts.
+Widths are multiples of what the table's slimmest straight gait sweeps, with the margin on either side.
+Ours is the beam and the two best-first searches of the portfolio, without OMPL's planners. Every planner's
+way passes the same certificate before it counts.
 """
 
 from __future__ import annotations
 
-import argparse
 import random
-import sys
 import time
-from collections.abc import Sequence
-from pathlib import Path
-from typing import Any
+from functools import lru_cache
 
 from benchmarks.section import Section
+from benchmarks.stored import Row, gather, stored_rows, study_parser
 from planners.generate.areas import corridor
 from planners.maze.places import RobotSize
 from planners.motion.store import load_motion
+from planners.motion.table import MotionTable
 from planners.plan.certify import certify
-from planners.plan.portfolio import ompl_gaits
-from planners.plan.solve import solve_with_lattice
+from planners.plan.portfolio import HALVINGS, ompl_gaits
+from planners.plan.solve import LatticeSolver
+from planners.search.lattice import LatticeSettings
 from planners.search.problem import Problem
-from srs_opt.files import write_json
 from srs_opt.gait_opt.catalogue import default_table
-from srs_opt.robot import wpi_srs
+from srs_opt.gait_opt.table import GaitTable
+from srs_opt.robot import Robot, wpi_srs
 
+NAME = "planner_narrow"
 MARGIN_M = 0.001
+RATIOS = (1.05, 1.15, 1.3, 1.6, 2.0)
 RIVALS = ("dubins-bitstar", "dubins-rrtconnect", "rrt", "est", "kpiece")
+PLANNERS = ("ours", *RIVALS)
+NODES, ITERATIONS = 5000, 1000
+LIMIT_S = 600.0  # a guard; nodes and iterations end the work
 
 
-def attempt(problem: Problem, planner: str, iterations: int, seed: int) -> bool:
-    """Whether a planner finds a plan that passes the certificate."""
-    if planner == "lattice":
-        return solve_with_lattice(problem, max_nodes=20_000, time_limit_s=120.0).plan is not None
-    gaits = ompl_gaits(problem, planner, iterations, seed)
-    return gaits is not None and certify(problem, gaits).passed
+@lru_cache(maxsize=1)
+def _setting() -> tuple[Robot, GaitTable, MotionTable, float]:
+    """Return robot, gaits, motion and the slimmest straight gait's band, m; once per process."""
+    robot = wpi_srs()
+    gaits = default_table(robot)
+    slimmest = min(sum(e.envelope_m) for e in gaits.gaits if e.radius_m is None)
+    return robot, gaits, load_motion(robot, gaits), slimmest
+
+
+def attempt(ratio: float, planner: str, seed: int) -> Row:
+    """Return whether a planner finds a plan that passes the certificate, and its processor time."""
+    robot, gaits, motion, slimmest = _setting()
+    size = RobotSize(robot.length_m, robot.body_width_m / 2, MARGIN_M)
+    maze = corridor(0.3, ratio * slimmest + 2 * MARGIN_M, 0.5, random.Random(seed), size)
+    problem = Problem(robot, gaits, motion, maze, MARGIN_M)
+    cpu = time.process_time()
+    if planner == "ours":
+        solved = _ours(problem)
+    else:
+        way = ompl_gaits(problem, planner, ITERATIONS, seed)
+        solved = way is not None and certify(problem, way).passed
+    return {
+        "ratio": ratio,
+        "planner": planner,
+        "seed": seed,
+        "solved": solved,
+        "cpu_s": time.process_time() - cpu,
+    }
+
+
+def _ours(problem: Problem) -> bool:
+    first = LatticeSolver(problem, time_limit_s=LIMIT_S).run(NODES)
+    if first.plan is not None or first.status == "infeasible":
+        return first.plan is not None
+    fine = LatticeSolver(problem, LatticeSettings(most_halvings=HALVINGS), beams=(), time_limit_s=LIMIT_S)
+    return fine.run(NODES).plan is not None
+
+
+def section(rows: list[Row], when: str) -> Section:
+    """Return success against width as a table."""
+    ratios = sorted({row["ratio"] for row in rows})
+    cells = []
+    for ratio in ratios:
+        line = [f"{ratio:.2f}"]
+        for planner in PLANNERS:
+            mine = [row for row in rows if row["ratio"] == ratio and row["planner"] == planner]
+            cpu = sum(row["cpu_s"] for row in mine) / max(len(mine), 1)
+            line.append(f"{sum(row['solved'] for row in mine)}/{len(mine)} ({cpu:.1f} s)")
+        cells.append(line)
+    notes = [
+        "Solved and certified, and processor time each. Width over the band of the slimmest straight gait, "
+        f"margins of {1e3 * MARGIN_M:g} mm besides; OMPL's planners get {ITERATIONS} iterations. {when}"
+    ]
+    return Section("Planner: narrow passages", ["width", *PLANNERS], cells, notes)
 
 
 def run(quick: bool) -> Section:
-    """Return the report of a few widths; `main` asks more seeds and iterations."""
-    planners = ("lattice", "dubins-rrtconnect") if quick else ("lattice", *RIVALS)
-    rows = study((1.6,) if quick else (1.05, 1.3, 1.6, 2.0), 1, 30 if quick else 1000, planners)
-    ratios = sorted({row["ratio"] for row in rows})
-    told = {(row["ratio"], row["planner"]): f"{row['solved']}, {row['cpu_s']:.1f} s" for row in rows}
-    lines = [[f"{ratio:g}", *[told[ratio, planner] for planner in planners]] for ratio in ratios]
-    notes = [
-        "A corridor 0.5 m long, its width in what the slimmest straight gait sweeps: certified plans found, "
-        "of one, and processor time. OMPL's planners have the same body and model, and 1000 iterations."
-    ]
-    return Section("Narrow passages", ["width", *planners], lines, notes)
-
-
-def study(
-    ratios: Sequence[float], seeds: int, iterations: int, planners: Sequence[str]
-) -> list[dict[str, Any]]:
-    """Return how many certified plans each planner finds at each width, and its mean processor time."""
-    robot = wpi_srs()
-    gaits = default_table(robot)
-    motion = load_motion(robot, gaits)
-    slimmest = min(sum(e.envelope_m) for e in gaits.gaits if e.radius_m is None)
-    size = RobotSize(robot.length_m, robot.body_width_m / 2, MARGIN_M)
-    rows = []
-    for ratio in ratios:
-        for planner in planners:
-            solved, cpu = 0, time.process_time()
-            for seed in range(seeds):
-                maze = corridor(0.3, ratio * slimmest, 0.5, random.Random(seed), size)
-                solved += attempt(Problem(robot, gaits, motion, maze, MARGIN_M), planner, iterations, seed)
-            cpu = (time.process_time() - cpu) / seeds
-            rows.append({"ratio": ratio, "planner": planner, "solved": solved, "cpu_s": cpu})
-            print(rows[-1], file=sys.stderr, flush=True)
-    return rows
+    """Return the stored study; two quick attempts where there is none."""
+    stored = None if quick else stored_rows(NAME)
+    if stored is None:
+        return section([attempt(2.0, planner, 0) for planner in ("ours", "dubins-bitstar")], "Quick.")
+    when, rows = stored
+    return section(rows, when)
 
 
 def main() -> None:
     """Run the suite and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--ratios", type=float, nargs="+", default=[1.05, 1.15, 1.3, 1.6, 2.0])
-    parser.add_argument("--seeds", type=int, default=2)
-    parser.add_argument("--iterations", type=int, default=1000)
-    parser.add_argument("--out", type=Path, default=Path("out/benchmarks/planner_narrow.json"))
+    parser = study_parser(NAME, __doc__, sets=2)
+    parser.add_argument("--ratios", type=float, nargs="+", default=list(RATIOS))
     options = parser.parse_args()
-    planners = ("lattice", *RIVALS)
-    rows = study(options.ratios, options.seeds, options.iterations, planners)
-    print(f"solved of {options.seeds}, mean CPU s")
-    print("ratio  " + "".join(f"{name:>20}" for name in planners))
-    for ratio in options.ratios:
-        cells = (f"{r['solved']:>12d} {r['cpu_s']:6.2f}s" for r in rows if r["ratio"] == ratio)
-        print(f"{ratio:5.2f}  " + "".join(cells))
-    write_json(options.out, rows)
+    items = [
+        (ratio, planner, options.seed - 1 + k)
+        for ratio in options.ratios
+        for planner in PLANNERS
+        for k in range(options.sets)
+    ]
+    print(section(gather(NAME, attempt, items, options), "").markdown())
 
 
 if __name__ == "__main__":

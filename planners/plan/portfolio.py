@@ -75,7 +75,7 @@ def _rounds(problem: Problem, wish: Wish, tell: Tell) -> PlanResult:
     fine = LatticeSolver(
         problem,
         LatticeSettings(most_halvings=HALVINGS),
-        beam=None,
+        beams=(),
         time_limit_s=wish.time_limit_s,
         tell=tell,
     )
@@ -169,7 +169,7 @@ def _better(problem: Problem, wish: Wish, result: PlanResult, tell: Tell) -> Pla
         left = wish.time_limit_s - (time.perf_counter() - began)
         if left <= 0:
             break
-        solver = LatticeSolver(problem, beam=replace(BEAM, width=width), time_limit_s=left, tell=tell)
+        solver = LatticeSolver(problem, beams=(replace(BEAM, width=width),), time_limit_s=left, tell=tell)
         other = solver.run()
         assert best.plan is not None  # the caller has looked
         if other.plan is not None and other.plan.cost(problem) < best.plan.cost(problem):

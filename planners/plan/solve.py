@@ -14,22 +14,25 @@ from planners.search.lattice import LatticeSearch, LatticeSettings, Root, at_res
 from planners.search.problem import ROUNDING_M, Problem
 
 CHUNK = 100  # nodes between looks at the clock
-LOOK_FIRST = 100  # nodes of the best-first search before the widths are looked at
+LOOK_FIRST = 100  # nodes before the widths are looked at
 TOO_NARROW = "no way with these gaits: even the widest route is too narrow for every gait of the table"
 BACK = 3  # cycles before a failure from where the way is searched again, more at every attempt
 ATTEMPTS = 12
 MORE_SLACK_M = 0.0005
 BEAM = BeamSettings()
+# what keeps hitting the posts of a narrow passage needs states told apart by millimetres
+FINE_BEAM = BeamSettings(width=40, cell_m=0.01, course_rad=0.05, slack_m=0.0002)
+BEAMS = (BEAM, FINE_BEAM)
 
 
 class LatticeSolver:
     """Search and certificate, together; can be asked to go on.
 
-    A beam looks first: it is quick and its plans are fast, but it may miss the way. Where it does the
-    best-first search looks at everything within reach. Where the finer simulation of the certificate leads
-    too near to a wall (the search integrates more coarsely), the search begins again a few cycles before,
-    from the finer simulation's state. When nothing is left to look at, the cells are halved once before the
-    maze is said to have no way.
+    A beam looks first: it is quick and its plans are fast, but it may miss the way. Where it does, a finer
+    one looks, then the best-first search looks at everything within reach. Where the finer simulation of
+    the certificate leads too near to a wall (the search integrates more coarsely), the search begins again
+    a few cycles before, from the finer simulation's state. When nothing is left to look at, the cells are
+    halved once before the maze is said to have no way.
 
     Parameters
     ----------
@@ -38,8 +41,8 @@ class LatticeSolver:
         Of the best-first search.
     root : Root, optional
         Where to begin; at rest at the start without it.
-    beam : BeamSettings or None
-        None leaves the beam out.
+    beams : tuple of BeamSettings
+        Tried one after the other before the best-first search.
     time_limit_s : float
         A guard only: what is found does not depend on it.
     tell : callable
@@ -52,12 +55,12 @@ class LatticeSolver:
         settings: LatticeSettings | None = None,
         root: Root | None = None,
         *,
-        beam: BeamSettings | None = BEAM,
+        beams: tuple[BeamSettings, ...] = BEAMS,
         time_limit_s: float = 30.0,
         tell: Callable[[str], None] = lambda message: None,
     ) -> None:
         self.problem, self.tell = problem, tell
-        self.settings, self.beam = settings or LatticeSettings(), beam
+        self.settings, self.beams = settings or LatticeSettings(), beams
         self.began, self.time_limit_s = time.perf_counter(), time_limit_s
         self.judged = root is not None  # widths are judged on the whole way only
         self.begin = root or at_rest(problem)
@@ -95,11 +98,11 @@ class LatticeSolver:
     def _look(self, last: int) -> tuple[int, ...] | PlanResult | None:
         """Return the gaits of a way, None when nothing is left to look at, or the answer when to stop."""
         while not self.search.exhausted:
+            if self._too_narrow():
+                return self._answer("infeasible", TOO_NARROW)
             way = self.search.advance(CHUNK)
             if way is not None:
                 return tuple(step.gait for step in way)
-            if self._too_narrow():
-                return self._answer("infeasible", TOO_NARROW)
             if time.perf_counter() - self.began > self.time_limit_s:
                 return self._answer("timeout", f"no plan within the time limit of {self.time_limit_s:g} s")
             if self.looked_at > last:
@@ -107,8 +110,8 @@ class LatticeSolver:
         return None
 
     def _too_narrow(self) -> bool:
-        """Judge the widths, once, when the way is not found at once."""
-        if self.judged or self.search.simulated < LOOK_FIRST or isinstance(self.search, BeamSearch):
+        """Judge the widths, once, when the first search has not found the way."""
+        if self.judged or self.looked_at < LOOK_FIRST or self.beams[:1] == (BEAM,):
             return False
         self.judged = True
         return narrower_than_any_gait(self.problem)
@@ -116,9 +119,11 @@ class LatticeSolver:
     def _retreat(self) -> bool:
         """Begin again from the start, more thoroughly; return whether there is anything left to try."""
         if not self.kept:
-            if self.beam is not None:
-                self.tell("the beam died; looking at everything within reach")
-                self.beam = None
+            if self.beams:
+                self.beams = self.beams[1:]
+                self.tell(
+                    "the beam died; looking " + ("finer" if self.beams else "at everything within reach")
+                )
             elif self.refined:
                 return False
             else:
@@ -151,9 +156,9 @@ class LatticeSolver:
 
     def _search_from(self, here: Root) -> BeamSearch | LatticeSearch:
         """Return a new search, with the slack that certificates have asked for."""
-        if self.beam is not None:
-            beam = replace(self.beam, slack_m=self.beam.slack_m + self.more_slack_m)
-            return BeamSearch(self.problem, beam, here)
+        if self.beams:
+            beam = self.beams[0]
+            return BeamSearch(self.problem, replace(beam, slack_m=beam.slack_m + self.more_slack_m), here)
         settings = replace(self.settings, slack_m=self.settings.slack_m + self.more_slack_m)
         return LatticeSearch(self.problem, settings, here)
 

@@ -131,8 +131,8 @@ def test_search_says_when_nothing_is_left(problem_in):
 
 def test_beam_and_best_first_search_both_arrive(problem_in):
     problem = problem_in(corridor(0.3))
-    for beam in (BeamSettings(), None):
-        plan = LatticeSolver(problem, beam=beam).run().plan
+    for beams in ((BeamSettings(),), ()):
+        plan = LatticeSolver(problem, beams=beams).run().plan
         assert plan is not None and plan.certificate.passed
 
 
@@ -140,7 +140,7 @@ def test_wider_beams_are_not_slower(problem_in):
     walls = [(0.7, 0.0, 0.9, 0.3), (1.4, 0.3, 1.6, 0.6)]
     problem = problem_in(maze_of((0, 0, 2.4, 0.6), (0.25, 0.3, 0.0), (2.1, 0.3, 0.08), walls))
     times = [
-        LatticeSolver(problem, beam=BeamSettings(width=width)).run().plan.duration_s for width in (4, 100)
+        LatticeSolver(problem, beams=(BeamSettings(width=width),)).run().plan.duration_s for width in (4, 100)
     ]
     assert times[1] <= times[0] + 0.1
 
