@@ -106,8 +106,8 @@ def caveats(found: Discrepancy) -> list[str]:
         notes.append(f"Only {found.gap.trials} trials were sealed: the interval of the gap is wide.")
     if found.gap is not None and found.gap.ratio is None and found.verdict.word in (NAMED, ONE_OF):
         notes.append(
-            "On the sealed trials the gap stands less than 2 % above the noise: too little to measure what share "
-            "of it the effect closes. The name rests on the open trials."
+            "On the sealed trials the gap stands less than 2 % above the noise: too little to measure what "
+            "share of it the effect closes. The name rests on the open trials."
         )
     if found.dataset.trials and found.dataset.trials[0].markers_m is None:
         notes.append(
