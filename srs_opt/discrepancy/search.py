@@ -20,6 +20,9 @@ from srs_opt.measurement.records import Trial
 
 DEEPEST, ROUNDS = 4, 6  # effects at once; additions or exchanges in all
 ADEQUATE = 0.01  # level at which a fitted model is rejected
+# Friction's smoothing is numerical, and its shape is nobody's physics: long data see the difference. What is
+# left of a gap is put down to it while it is this share of the noise's variance and of the gap's.
+OF_NOISE, OF_GAP = 0.02, 0.002
 FALSE_NAME = 0.002  # family-wise level for adding an effect
 # Deviance within which two sets of effects cannot be told apart. The truth falls behind a rival by D with
 # probability Phi(-sqrt(D)) at worst, whatever separates the two: under 1 % here, so that the sets that are
@@ -182,7 +185,7 @@ class Search:
             if better is None or not self._worth(better, current.hypothesis):
                 break
             before, current = current, self._pruned(self.examine(better))
-            if current.adequate or _stuck(before.hypothesis, current.hypothesis):
+            if explained(null, current) or _stuck(before.hypothesis, current.hypothesis):
                 break
         return current, self.fitted
 
@@ -268,6 +271,13 @@ class Search:
             if smaller is not None and smaller.deviance < beat:
                 return self._pruned(self.examine(smaller))
         return current
+
+
+def explained(null: Examined, examined: Examined) -> bool:
+    """Whether nothing is left of the gap, or no more than the smoothing of friction can leave."""
+    left = examined.hypothesis.fit.misfit_ratio - 1
+    gap = null.hypothesis.fit.misfit_ratio - 1
+    return examined.adequate or (left < OF_NOISE and left < OF_GAP * gap)
 
 
 def _stuck(before: Hypothesis, after: Hypothesis) -> bool:

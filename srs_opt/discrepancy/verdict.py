@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from srs_opt.discrepancy.seal import Gap
-from srs_opt.discrepancy.search import ADEQUATE, Examined
+from srs_opt.discrepancy.search import ADEQUATE, Examined, explained
 from srs_opt.discrepancy.select import Selection
 
 DETECTED = 0.05
@@ -50,7 +50,7 @@ def judge(
     if selection is None or not selection.best.candidates:
         return Verdict(UNKNOWN, f"there is a gap (p = {p:.2g}), but no known effect explains it")
     label = " + ".join(selection.best.names)
-    if not best.adequate:
+    if not explained(null, best):
         left = best.detection.p_value
         return Verdict(
             UNKNOWN,
