@@ -30,7 +30,6 @@ from srs_opt.gait import Gait
 from srs_opt.gait_opt.collocation.problem import CycleProblem
 from srs_opt.gait_opt.goal import Goal, Limits
 from srs_opt.gait_opt.search import search
-from srs_opt.gait_opt.table import TableGait
 from srs_opt.robot import Robot
 from virtual_lab.assemble import assemble
 from virtual_lab.simulate import look, sample
@@ -39,6 +38,7 @@ from virtual_lab.truth import Truth
 
 EFFECTS = ("curvature_bias", "gap_bending", "tether_drag")
 MARGIN_M = 0.01
+LAG_RAD = 0.9
 FRAMES = 40  # per cycle
 SETTLED, MEASURED = 10, 10  # cycles
 ALONG = 12  # points of the body's centre line between two links
@@ -120,11 +120,10 @@ def robots_of(effect: str, folder: Path) -> tuple[Truth, dict[str, Robot], str]:
 
 
 def planned(robot: Robot, gait: Gait, maze_file: Path) -> tuple[Problem, Plan | None]:
-    """Plan through a maze with the robot's fastest gait and its turning companions."""
+    """Plan through a maze with uniform waves of the fastest gait's frequency and pressure."""
     from benchmarks.planner_traverse import family
-    from srs_opt.orbit.steady import steady_gait
 
-    table = family(robot, TableGait.of_orbit("fast", steady_gait(robot, gait)))
+    table = family(robot, gait.frequency_hz, gait.pressure_kpa, LAG_RAD)
     problem = Problem(robot, table, load_motion(robot, table), load_maze(str(maze_file)), MARGIN_M)
     return problem, solve_with_lattice(problem, max_nodes=20_000, time_limit_s=120.0).plan
 

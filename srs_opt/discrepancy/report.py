@@ -107,8 +107,8 @@ def caveats(found: Discrepancy) -> list[str]:
     if found.best is not None and found.verdict.word in (NAMED, ONE_OF) and not found.best.adequate:
         left, p = found.best.hypothesis.fit.misfit_ratio - 1, found.best.detection.p_value
         notes.append(
-            f"Something is left (p = {p:.2g}), {left:.1%} of the noise's variance: as little as the numerical "
-            "smoothing of friction can leave, so that it does not count against the name."
+            f"Something is left (p = {p:.2g}), {left:.1%} of the noise's variance: as little as the "
+            "numerical smoothing of friction can leave, so that it does not count against the name."
         )
     if found.gap is not None and found.gap.ratio is None and found.verdict.word in (NAMED, ONE_OF):
         notes.append(
