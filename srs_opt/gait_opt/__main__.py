@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from srs_opt.gait_opt.goal import Limits
     from srs_opt.robot import Robot
 
+MOST_INTERVALS = 8  # more would have to be shorter than a valve can follow
+
 
 def build_parser() -> Parser:
     """Return the command's options."""
@@ -96,6 +98,8 @@ def problem_from(options: argparse.Namespace) -> CycleProblem:
     goal = Goal(options.objective, options.speed, options.radius, options.turn_rate, options.envelope)
     if options.intervals > 1 and options.valves != "free":
         raise InputError("--intervals goes with --valves free: a wave has one interval per segment and cycle")
+    if options.intervals > MOST_INTERVALS:
+        raise InputError(f"--intervals {options.intervals}: at most {MOST_INTERVALS} on-intervals per cycle")
     if options.warm and options.valves == "free":
         raise InputError("--warm goes with --valves wave")
     return CycleProblem(tuple(robots), options.model, goal, limits_from(options), options.intervals)

@@ -40,6 +40,11 @@ class Goal:
             raise InputError(f"objective must be one of {', '.join(OBJECTIVES)}, found '{self.objective}'")
         if self.objective == "slim" and not self.speed_m_s:
             raise InputError("objective slim needs a wanted speed: --speed M_S")
+        if self.objective == "speed" and self.speed_m_s is not None:
+            raise InputError(
+                "--speed has no meaning for objective speed, which takes all that it gets; ask for slim, "
+                "transport or turn at that speed"
+            )
         if self.radius_m is not None and self.radius_m == 0:
             raise InputError("a wanted radius must not be zero")
         if self.radius_m is not None and self.turn_rate_rad_s is not None:
