@@ -13,7 +13,7 @@ LIMIT_MB, LARGE = 1000.0, 100_000
 
 # Rows come from a stand-in of the solver in most points, so that the sweep's own memory is seen at size
 _PROGRAM = """
-import resource, sys, tempfile
+import re, sys, tempfile
 from pathlib import Path
 import numpy as np
 from srs_opt.gait_map import grid
@@ -25,7 +25,13 @@ points = grid.grid_points(list(np.linspace(1, 2, count)), [50.0], [0.4], [1.5])
 with tempfile.TemporaryDirectory() as folder:
     found = grid.gait_map(wpi_srs(), "complex", points, resume=Path(folder) / "kept")
     grid.save_map(found, Path(folder) / "map.csv")
-print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+# of this program alone: getrusage also counts what the parent held when it forked
+status = Path("/proc/self/status")
+if status.exists():
+    print(re.search(r"VmHWM:\\s+(\\d+)", status.read_text())[1])
+else:
+    import resource
+    print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 """
 
 

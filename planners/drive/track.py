@@ -7,7 +7,8 @@ the robot turns by itself. That is what a robot with other friction, a tether or
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -19,8 +20,8 @@ from planners.search.lattice import arrival_index
 from planners.search.problem import Problem
 
 Array = NDArray[np.float64]
-PLACE_M, COURSE_RAD, SPEED_M_S = 0.02, 0.15, 0.35  # deviations that cost one unit each
-UNIT_S = 0.5  # time that costs one unit
+PLACE_M, COURSE_RAD, SPEED_M_S = 0.02, 0.15, 0.6  # deviations that cost one unit each
+UNIT_S = 0.1  # time that costs one unit: a robot slower than its plan must not creep along it
 AIR_M, AIR_UNITS = 0.015, 4.0  # below this clearance it costs, up to so many units at contact
 CONTACT_M, CONTACT_UNITS = 0.0005, 100.0
 CHANGE_UNITS = 0.05
@@ -28,6 +29,7 @@ HORIZON, BEAM = 3, 5
 NODES_PER_CYCLE = 6
 BEYOND_M = 0.12  # past the goal
 LEARNING = 0.3
+LEAST_WAY_M = 0.005  # a cycle that should go less far teaches nothing
 _THIN = 3  # every third sample of a cycle is looked at
 
 
@@ -41,27 +43,42 @@ class Reference(NamedTuple):
 
 @dataclass(frozen=True)
 class Learned:
-    """How the driven robot differs from the table: stretch of a cycle's way, turn of its own (rad/s)."""
+    """How the driven robot differs from the table: stretch of a cycle's way, turn of its own (rad/s).
+
+    `own` holds what single gaits were seen to do beyond the common stretch: what slows one gait a little may
+    stop another.
+    """
 
     stretch: float = 1.0
     drift_rad_s: float = 0.0
+    own: Mapping[int, float] = field(default_factory=dict)
+
+    def stretches(self, gaits: int) -> Array:
+        """Return every gait's stretch, (gaits,)."""
+        found = np.full(gaits, self.stretch)
+        for gait, share in self.own.items():
+            found[gait] *= share
+        return found
 
     def apply(self, local: Array, period_s: Array | float) -> Array:
-        """Correct poses (..., SAMPLES + 1, 3) in the frame of a cycle's start."""
+        """Correct all gaits' poses (gaits, SAMPLES + 1, 3) in the frame of a cycle's start."""
         turned = self.drift_rad_s * np.asarray(period_s)[..., None] * np.linspace(0, 1, local.shape[-2])
         c, s = np.cos(turned / 2), np.sin(turned / 2)
-        x, y = self.stretch * local[..., 0], self.stretch * local[..., 1]
+        stretch = self.stretches(len(local))[:, None]
+        x, y = stretch * local[..., 0], stretch * local[..., 1]
         return np.stack([c * x - s * y, s * x + c * y, local[..., 2] + turned], axis=-1)
 
-    def update(self, predicted: Array, observed: Array, period_s: float) -> Learned:
+    def update(self, predicted: Array, observed: Array, period_s: float, gait: int) -> Learned:
         """Learn from one cycle's predicted (corrected) and observed displacement, (3,) each."""
         far = math.hypot(predicted[0], predicted[1])
-        stretch = self.stretch
-        if far > 0.02:
-            along = float(observed[:2] @ predicted[:2]) / far**2
-            stretch *= 1 + LEARNING * (min(max(along, 0.5), 1.5) - 1)
+        stretch, own = self.stretch, dict(self.own)
+        if far > LEAST_WAY_M:
+            along = min(max(float(observed[:2] @ predicted[:2]) / far**2, 0.2), 1.5)
+            stretch = min(max(stretch * (1 + LEARNING * (along - 1)), 0.5), 1.5)
+            alone = own.get(gait, 1.0) * along * self.stretch / stretch
+            own[gait] = min(max(alone, 0.1), 1.5)
         drift = self.drift_rad_s + LEARNING * float(observed[2] - predicted[2]) / period_s
-        return Learned(min(max(stretch, 0.5), 1.5), min(max(drift, -1.0), 1.0))
+        return Learned(stretch, min(max(drift, -1.0), 1.0), own)
 
 
 @dataclass(frozen=True)
@@ -108,7 +125,11 @@ def reference_of(problem: Problem, plan: Plan) -> Reference:
     c = plan.certificate
     periods = problem.motion.period_s[list(plan.gaits)]
     ends = np.concatenate([[0.0], np.cumsum(periods)])
-    gaits = [problem.motion.rest, *plan.gaits]
+    steady = problem.motion.steady_speed_m_s
+    way = list(plan.gaits)
+    if len(way) > 1 and steady[way[-1]] * steady[way[-2]] < 0:
+        way[-1] = way[-2]  # the last gait only brakes: the robot still travels as in the cycle before
+    gaits = [problem.motion.rest, *way]
     heading = np.interp(ends, c.time_s, c.pose[:, 2])
     course = heading + problem.motion.course[gaits]
     course[-1] = course[-2] if c.time_s[-1] < ends[-1] - 1e-6 else course[-1]
@@ -117,7 +138,7 @@ def reference_of(problem: Problem, plan: Plan) -> Reference:
     x, y = (np.interp(times, c.time_s, c.pose[:, k]) for k in range(2))
     speed = np.append(np.hypot(np.diff(x), np.diff(y)) / np.diff(times), np.nan)
     speed[-1] = speed[-2]
-    backwards = np.array([problem.motion.steady_speed_m_s[g] < 0 for g in plan.gaits])
+    backwards = np.array([steady[g] < 0 for g in way])
     cycle = np.minimum(np.searchsorted(ends, times, side="right") - 1, len(plan.gaits) - 1)
     speed = np.where(backwards[cycle], -speed, speed)
     pose = np.stack([x, y, np.interp(times, ends, course)], axis=1)
@@ -183,7 +204,7 @@ def _grow(problem: Problem, reference: Reference, branch: _Branch, learned: Lear
         ],
         axis=-1,
     )
-    speed = move.speed_m_s * learned.stretch
+    speed = move.speed_m_s * learned.stretches(len(move.speed_m_s))
     place = np.concatenate([pose[:, -1, :2], (pose[:, -1, 2] + motion.course[:-1])[:, None]], axis=1)
     offset = _offset(reference, place, speed)
     order = np.argsort(offset, kind="stable")[: 3 * BEAM]

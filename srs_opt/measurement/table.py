@@ -44,7 +44,7 @@ class Row:
             return default
         value = to_number(text)
         if value is None or not math.isfinite(value):
-            found = f"'{text[:40]}'" if text else "an empty cell"
+            found = repr(text[:40]) if text else "an empty cell"
             report.error(self.file, self.line, f"{column}: expected a number, found {found}")
             return math.nan
         return value
@@ -200,8 +200,10 @@ def _faulty_numbers(file: str, report: Report) -> NumberTable | None:
         row = [to_number(cell) for cell in cells]
         for name, cell, value in zip(header, cells, row):
             if value is None or math.isinf(value):
-                text = cell.strip()[:40]
-                report.error(file, number, f"{name[:40]}: expected a number or an empty cell, found '{text}'")
+                text = repr(cell.strip()[:40])
+                report.error(
+                    file, number, f"{name[:40]}: expected a number or an empty cell, found {text[:40]!r}"
+                )
         rows.append([math.nan if v is None or math.isinf(v) else v for v in row])
         numbers.append(number)
     if not rows:

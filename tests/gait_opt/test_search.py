@@ -160,7 +160,7 @@ def test_interrupted_search_keeps_the_best():
 @pytest.mark.slow
 def test_starts_give_the_same_bits_wherever_they_run_and_go_on(monkeypatch, tmp_path):
     rungs = Rung(0.03, 30, 0.1, 1), Rung(0.004, 50, 0.05, 1)
-    monkeypatch.setattr(search_module, "ladder", lambda own_m_s: rungs)
+    monkeypatch.setattr(search_module, "ladder", lambda own_m_s, **how: rungs)
     problem = CycleProblem((ROBOT,), "complex", Goal(), Limits())
     told = []
 

@@ -218,7 +218,7 @@ def test_ctrl_c_leaves_nothing_half_written(name, tmp_path):
 @pytest.mark.parametrize("name", ["gait_opt", "table", "discrepancy"])
 def test_ctrl_c_in_long_work(name, tmp_path):
     """Work in several processes ends as one; gait_opt may answer with the best gait so far."""
-    arguments = ["srs_opt.gait_opt", "--starts", "8"]
+    arguments = ["srs_opt.gait_opt", "--starts", "200"]
     if name == "table":
         arguments = ["srs_opt.gait_opt", "--table", "--jobs", "2"]
     if name == "discrepancy":
