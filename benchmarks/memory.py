@@ -11,9 +11,19 @@ from benchmarks.section import Section
 
 LIMIT_MB, LARGE = 1000.0, 100_000
 
+# For a program of its own: getrusage alone also counts what the parent held when it forked
+OWN_PEAK = r"""
+def own_peak_kb():
+    import re, resource, sys
+    from pathlib import Path
+    status = Path("/proc/self/status")
+    if status.exists():
+        return int(re.search(r"VmHWM:\s+(\d+)", status.read_text())[1])
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // (1024 if sys.platform == "darwin" else 1)
+"""
 # Rows come from a stand-in of the solver in most points, so that the sweep's own memory is seen at size
 _PROGRAM = """
-import re, sys, tempfile
+import sys, tempfile
 from pathlib import Path
 import numpy as np
 from srs_opt.gait_map import grid
@@ -25,21 +35,15 @@ points = grid.grid_points(list(np.linspace(1, 2, count)), [50.0], [0.4], [1.5])
 with tempfile.TemporaryDirectory() as folder:
     found = grid.gait_map(wpi_srs(), "complex", points, resume=Path(folder) / "kept")
     grid.save_map(found, Path(folder) / "map.csv")
-# of this program alone: getrusage also counts what the parent held when it forked
-status = Path("/proc/self/status")
-if status.exists():
-    print(re.search(r"VmHWM:\\s+(\\d+)", status.read_text())[1])
-else:
-    import resource
-    print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+print(own_peak_kb())
 """
 
 
 def peak_mb(points: int, *, solved: bool = True) -> float:
     """Return the peak memory of a process that computes, keeps and writes a map of `points` gaits."""
-    command = [sys.executable, "-c", _PROGRAM, str(points), "solved" if solved else "stand-in"]
+    command = [sys.executable, "-c", OWN_PEAK + _PROGRAM, str(points), "solved" if solved else "stand-in"]
     done = subprocess.run(command, check=True, capture_output=True, text=True)
-    return float(done.stdout) / (1024 if sys.platform != "darwin" else 1024**2)
+    return float(done.stdout) / 1024
 
 
 def run(quick: bool) -> Section:

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from planners.motion.table import body_in_room
 from planners.search.clearance import BodyClearance
-from planners.search.lattice import arrival_index
 from planners.search.problem import Problem
+from planners.search.tree import arrival_index
 from srs_opt.model.outline import centre_line_function
 from srs_opt.robot import Robot
 from srs_opt.simulate.integrate import Integrator

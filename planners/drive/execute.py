@@ -15,8 +15,8 @@ from planners.drive.track import Learned, Where, choose, nearest_node, reference
 from planners.motion.robots import undelayed
 from planners.plan.answer import Plan
 from planners.plan.solve import solve_with_lattice
-from planners.search.lattice import Root
 from planners.search.problem import ROUNDING_M, Problem
+from planners.search.tree import Root
 from srs_opt.errors import InputError, NoAnswerError
 from srs_opt.model.parameters import valve_delay_s
 from srs_opt.robot import Robot

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from planners.motion.table import SAMPLES, body_in_room
 from planners.plan.answer import Plan
-from planners.search.lattice import arrival_index
 from planners.search.problem import Problem
+from planners.search.tree import arrival_index
 
 Array = NDArray[np.float64]
 PLACE_M, COURSE_RAD, SPEED_M_S = 0.02, 0.15, 0.6  # deviations that cost one unit each

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planners.motion.table import body_in_room
-from planners.search.lattice import Root, arrival_index, at_rest
 from planners.search.problem import ROUNDING_M, Problem
+from planners.search.tree import Root, arrival_index, at_rest
 from srs_opt.model.outline import POINTS_PER_ARC, centre_line_function
 from srs_opt.simulate.integrate import Trajectory
 from srs_opt.simulate.timeline import Timeline

@@ -19,8 +19,9 @@ from multiprocessing import get_context
 from planners.plan.answer import Plan, PlanResult
 from planners.plan.certify import certify
 from planners.plan.solve import BEAM, LatticeSolver
-from planners.search.lattice import LatticeSettings, Step
+from planners.search.lattice import LatticeSettings
 from planners.search.problem import Problem
+from planners.search.tree import Step
 from srs_opt.processes import workers_deaf_to_interrupts
 
 CONTROL = ("rrt", "est", "kpiece")

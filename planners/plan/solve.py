@@ -10,8 +10,9 @@ from planners.plan.answer import Plan, PlanResult, Status
 from planners.plan.certify import Certificate, certify
 from planners.plan.explain import narrower_than_any_gait
 from planners.search.beam import BeamSearch, BeamSettings
-from planners.search.lattice import LatticeSearch, LatticeSettings, Root, at_rest
+from planners.search.lattice import LatticeSearch, LatticeSettings
 from planners.search.problem import ROUNDING_M, Problem
+from planners.search.tree import Root, at_rest
 
 CHUNK = 100  # nodes between looks at the clock
 LOOK_FIRST = 100  # nodes before the widths are looked at

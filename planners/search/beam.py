@@ -16,8 +16,8 @@ import numpy as np
 from planners.motion.table import SAMPLES
 from planners.search.ahead import motion_lines, remaining
 from planners.search.costmap import BLOCKED_S
-from planners.search.lattice import Root, Step, arrival_index, at_rest
 from planners.search.problem import Cycle, Problem
+from planners.search.tree import Root, Step, Tree, arrival_index, at_rest, cell_of
 
 TOGETHER = 8  # cycles simulated in one go
 FIRST_LOOK = 32  # gaits whose bodies are looked at first, most promising first
@@ -75,8 +75,8 @@ class BeamSearch:
         self.root_slack_m = root.slack_m
         self.expanded = self.simulated = 0
         first = Cycle(root.state, root.state[None, :3], np.zeros((0, 1, 2)))
-        self._cycle, self._gait, self._spent, self._parent = [first], [root.gait], [0.0], [-1]
-        self._front = [0]
+        self._tree = Tree()
+        self._front = [self._tree.add(-1, root.gait, 0.0, first)]
         self._cheapest: dict[tuple[int, ...], float] = {}
         self._best: tuple[float, int] | None = None
         self._nearest, self._stalled = math.inf, 0
@@ -99,13 +99,13 @@ class BeamSearch:
             self._front = self._chosen(offers) if self._stalled < STALLED else []
         if self._front or self._best is None:
             return None
-        return self._way_to(self._best[1])
+        return self._tree.way_to(self._best[1])
 
     def _offers(self, node: int) -> list[_Offer]:
         """Return the cycles that may follow a state, by the motion table."""
         self.expanded += 1
         problem, s, motion = self.problem, self.settings, self.problem.motion
-        state, before = self._cycle[node].state, self._gait[node]
+        state, before = self._tree.cycle[node].state, self._tree.gait[node]
         move = motion.move(state[0], state[1], state[2], before, state[3])
         left = remaining(problem, move.pose[:, -1], move.speed_m_s)
         order = np.argsort(left + motion.period_s, kind="stable")
@@ -117,7 +117,7 @@ class BeamSearch:
             spare = room - problem.margin_m
             fits = spare > -problem.field.error_m
             tight = np.clip(1 - spare / motion.body_width_m, 0.0, 1.0)
-            spent = self._spent[node] + problem.tariff.of_cycles(gaits, move.pose[gaits], spare)
+            spent = self._tree.spent[node] + problem.tariff.of_cycles(gaits, move.pose[gaits], spare)
             spent = spent + s.change_s * (gaits != before) + s.air_s * tight
             rank = spent + left[gaits]
             offers += [
@@ -138,7 +138,7 @@ class BeamSearch:
                 if not batch:
                     break
             self.simulated += len(batch)
-            cycles = self.problem.simulate_all([(self._cycle[o.parent].state, o.gait) for o in batch])
+            cycles = self.problem.simulate_all([(self._tree.cycle[o.parent].state, o.gait) for o in batch])
             for offer, cycle in zip(batch, cycles):
                 node = None if cycle is None else self._taken(offer, cycle)
                 if node is not None:
@@ -151,36 +151,20 @@ class BeamSearch:
     def _taken(self, offer: _Offer, cycle: Cycle) -> int | None:
         """Keep a simulated cycle if it is clear and the cheapest to come here; None too where it arrives."""
         s, state = self.settings, cycle.state
-        course = (state[2] + self.problem.motion.course[offer.gait]) % (2 * math.pi)
-        key = (
-            math.floor(state[0] / s.cell_m),
-            math.floor(state[1] / s.cell_m),
-            math.floor(course / s.course_rad),
-            math.floor(state[3] / s.speed_m_s + 0.5),
-        )
+        course = state[2] + self.problem.motion.course[offer.gait]
+        key = cell_of(state, course, s.cell_m, s.course_rad, s.speed_m_s)
         if self._cheapest.get(key, math.inf) <= offer.spent:
             return None
         slack = self.root_slack_m if offer.parent == 0 else s.slack_m
         if not self.problem.body.keeps_margin(cycle.lines, slack):
             return None
         self._cheapest[key] = offer.spent
-        self._cycle.append(cycle)
-        self._gait.append(offer.gait)
-        self._spent.append(offer.spent)
-        self._parent.append(offer.parent)
-        node = len(self._gait) - 1
+        node = self._tree.add(offer.parent, offer.gait, offer.spent, cycle)
         arrived = arrival_index(self.problem.goal, cycle.pose)
         if arrived is None:
             return node
-        before = self._spent[offer.parent]
+        before = self._tree.spent[offer.parent]
         price = before + (offer.spent - before) * arrived / SAMPLES
         if self._best is None or price < self._best[0]:
             self._best = price, node
         return None
-
-    def _way_to(self, node: int) -> list[Step]:
-        steps = []
-        while self._parent[node] >= 0:
-            steps.append(Step(self._gait[node], self._cycle[node]))
-            node = self._parent[node]
-        return steps[::-1]

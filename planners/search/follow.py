@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from planners.drive.track import Learned, Reference, Where, choose, nearest_node
 from planners.search.costmap import speed_by_room
-from planners.search.lattice import Step, arrival_index, at_rest
 from planners.search.problem import Problem
+from planners.search.tree import Step, arrival_index, at_rest
 
 Array = NDArray[np.float64]
 SPACING_M = 0.03  # between the nodes of a reference

@@ -10,18 +10,14 @@ from __future__ import annotations
 
 import heapq
 import math
-from dataclasses import dataclass, field
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from planners.maze.places import Goal
 from planners.search.ahead import motion_lines, remaining
 from planners.search.costmap import BLOCKED_S
 from planners.search.problem import Cycle, Problem
-
-Array = NDArray[np.float64]
+from planners.search.tree import Root, Step, Tree, arrival_index, at_rest, cell_of
 
 
 @dataclass(frozen=True)
@@ -56,50 +52,6 @@ class LatticeSettings:
     slack_m: float = 0.0005
 
 
-class Root(NamedTuple):
-    """Where a search begins: state of the dynamic model, gait before (or rest), slack of the first cycle."""
-
-    state: Array
-    gait: int
-    slack_m: float
-
-
-def at_rest(problem: Problem) -> Root:
-    """Return the straight robot at rest at the start."""
-    start = problem.start
-    state = problem.run.rest(start.x, start.y, start.heading)
-    return Root(state, problem.motion.rest, problem.start_slack_m)
-
-
-class Step(NamedTuple):
-    """A node on the way: the gait that led here and what happened in its cycle."""
-
-    gait: int
-    cycle: Cycle
-
-
-@dataclass
-class _Tree:
-    parent: list[int] = field(default_factory=list)
-    gait: list[int] = field(default_factory=list)
-    spent: list[float] = field(default_factory=list)
-    cycle: list[Cycle] = field(default_factory=list)
-
-    def add(self, parent: int, gait: int, spent: float, cycle: Cycle) -> int:
-        self.parent.append(parent)
-        self.gait.append(gait)
-        self.spent.append(spent)
-        self.cycle.append(cycle)
-        return len(self.parent) - 1
-
-    def way_to(self, node: int) -> list[Step]:
-        steps = []
-        while self.parent[node] >= 0:
-            steps.append(Step(self.gait[node], self.cycle[node]))
-            node = self.parent[node]
-        return steps[::-1]
-
-
 class LatticeSearch:
     """A search that can be asked for the next plan until nothing is left."""
 
@@ -112,7 +64,7 @@ class LatticeSearch:
         self.settings = settings or LatticeSettings()
         self.expanded = 0
         self.simulated = 0
-        self._tree = _Tree()
+        self._tree = Tree()
         self._closed: set[tuple[int, ...]] = set()
         self._open: list[tuple[float, int, int, int, float]] = []
         self._count = 0
@@ -162,15 +114,8 @@ class LatticeSearch:
         if s.most_halvings:
             room = max(float(self.problem.body.estimate(cycle.lines[::2]).min()), 1e-3)
             finer = min(max(math.ceil(math.log2(s.close_m / room)), 0), s.most_halvings)
-        course = (state[2] + self.problem.motion.course[gait]) % (2 * math.pi)
-        cell, angle = s.cell_m / 2**finer, s.course_rad / 2**finer
-        return (
-            finer,
-            math.floor(state[0] / cell),
-            math.floor(state[1] / cell),
-            math.floor(course / angle),
-            math.floor(state[3] / s.speed_m_s + 0.5),
-        )
+        course = state[2] + self.problem.motion.course[gait]
+        return finer, *cell_of(state, course, s.cell_m / 2**finer, s.course_rad / 2**finer, s.speed_m_s)
 
     def _propose(self, node: int) -> None:
         """Put the cycles that can follow a node on the list."""
@@ -191,12 +136,3 @@ class LatticeSearch:
         for gait in np.flatnonzero(possible):
             self._count += 1
             heapq.heappush(self._open, (float(rank[gait]), self._count, node, int(gait), float(spent[gait])))
-
-
-def arrival_index(goal: Goal, pose: Array) -> int | None:
-    """Return the first of the poses (n, 3) that is in the goal, heading included; None if none is."""
-    inside = np.flatnonzero(goal.distance(pose[:, :2]) <= 0)
-    for index in inside:
-        if goal.heading_error(float(pose[index, 2])) <= 0:
-            return int(index)
-    return None

@@ -10,9 +10,9 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
-from planners.search.lattice import Step, arrival_index, at_rest
 from planners.search.ompl_setup import counted, seeded
 from planners.search.problem import Cycle, Problem
+from planners.search.tree import Step, arrival_index, at_rest
 
 MOST_CYCLES = 6  # that one control is held
 SLACK_M = 0.0005

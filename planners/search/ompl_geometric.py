@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planners.search.follow import follow, reference_along
-from planners.search.lattice import Step
 from planners.search.ompl_setup import counted, seeded
 from planners.search.problem import Problem
+from planners.search.tree import Step
 
 Array = NDArray[np.float64]
 STEP_M = 0.02  # between the poses at which a path is checked and given back

@@ -80,14 +80,14 @@ def compiled(key: str, build: Callable[[], ca.Function], flags: tuple[str, ...] 
     flags : tuple of str
         For the compiler.
     """
-    found = library(key, build, _casadi_source, flags)
+    found = shared_library(key, build, _casadi_source, flags)
     if found is not None:
         with contextlib.suppress(RuntimeError):  # made for another machine
             return ca.external(found.stem, str(found))
     return build()
 
 
-def library(
+def shared_library(
     key: str,
     build: Callable[[], ca.Function],
     source: Callable[[ca.Function, str], str],

@@ -46,7 +46,7 @@ class Kernel:
 
     def __init__(self, key: str, sizes: tuple[int, int, int], build: Callable[[], ca.Function]) -> None:
         self._nx, self._segments, self._np = sizes
-        path = compiled.library(key, build, lambda f, name: step_source(f, name, LANES), _flags())
+        path = compiled.shared_library(key, build, lambda f, name: step_source(f, name, LANES), _flags())
         self._run = _loaded(path)
         self._slow = Buffered(build()) if self._run is None else None
 

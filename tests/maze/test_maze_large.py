@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from benchmarks.memory import OWN_PEAK
+
 MEASURE = """
-import json, resource, sys, time
+import json, sys, time
 from planners.maze.load import load_maze
 from planners.maze.field import DistanceField
 begun = time.perf_counter()
@@ -19,7 +21,7 @@ field = DistanceField.of(maze)
 tabled = time.perf_counter() - begun - loaded
 maze.point_clearances([(100.0 + i, 150.0 + i) for i in range(100)])
 exact = time.perf_counter() - begun - loaded - tabled
-peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+peak = own_peak_kb() * 1024
 nodes = field.values.size
 print(json.dumps(dict(loaded=loaded, tabled=tabled, exact=exact, peak=peak, nodes=nodes)))
 """
@@ -41,7 +43,7 @@ def test_large_maps(kind, fill, tmp_path):
         yaw = 0.3 if kind == "turned" else 0.0
         path.write_text(f"image: m.pgm\nresolution: 0.1\norigin: [0, 0, {yaw}]\n")
     run = subprocess.run(
-        [sys.executable, "-c", MEASURE, str(path)], capture_output=True, text=True, check=True
+        [sys.executable, "-c", OWN_PEAK + MEASURE, str(path)], capture_output=True, text=True, check=True
     )
     found = json.loads(run.stdout)
     assert found["loaded"] < 5
