@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import multiprocessing
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
@@ -117,15 +118,12 @@ def _serve(
 
     experiment = Experiment(Model(robot, model), trials, sd_m, tolerance_m_s=tolerance_m_s)
     known = {t.name: t for t in trials}
-    while True:
-        try:
-            request = connection.recv()
-        except (EOFError, KeyboardInterrupt):
-            return
-        if request is None:
-            return
-        names, point, coordinates, extra = request
-        try:
-            connection.send(experiment.own_grams([known[n] for n in names], point, coordinates, extra))
-        except NoAnswerError as error:
-            connection.send(str(error))
+    # a parent that has gone, between two requests or in the middle of one, is no failure of this process
+    with contextlib.suppress(EOFError, OSError, KeyboardInterrupt):
+        while (request := connection.recv()) is not None:
+            names, point, coordinates, extra = request
+            try:
+                answer: object = experiment.own_grams([known[n] for n in names], point, coordinates, extra)
+            except NoAnswerError as error:
+                answer = str(error)
+            connection.send(answer)
