@@ -96,7 +96,7 @@ def _fulfil(work: Work, task: Task) -> dict[str, Any]:
     wish = task.wish
     objective = "speed" if wish.radius_m is None else "turn"
     goal = Goal(objective, radius_m=wish.radius_m, envelope_m=wish.band_m)
-    problem = CycleProblem((work.robot,), work.model, goal, work.limits)
+    problem = CycleProblem((wish.laden(work.robot),), work.model, goal, work.limits)
     try:
         found = _solve(problem, task)
         gait = finished(problem, found.gait)
@@ -115,6 +115,8 @@ def _kept(wish: Wish, entry: TableGait) -> bool:
     """Whether a gait is what was wished for, near enough."""
     if entry.speed_m_s < _LEAST_SPEED_M_S:
         return False
+    if wish.load:  # asked for under load: without, it is what it is
+        return (wish.radius_m is None) == (abs(entry.turn_rate_rad_s) < _STRAIGHT_RAD_S)
     if wish.band_m is not None and sum(entry.envelope_m) > wish.band_m * (1 + _BAND_EXCESS):
         return False
     if wish.radius_m is None:
