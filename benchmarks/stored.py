@@ -14,9 +14,11 @@ from typing import Any
 from benchmarks.section import machine
 from srs_opt.command import positive_int
 from srs_opt.files import write_text
-from srs_opt.sweep import Resume, sweep
+from srs_opt.sweep import Resume, source_digest, sweep
 
-STORED = Path(__file__).parent / "stored"
+HERE = Path(__file__).resolve().parent
+STORED = HERE / "stored"
+PACKAGES = ("benchmarks", "planners", "virtual_lab")  # what rows depend on, besides srs_opt
 Row = Any  # what JSON holds
 
 
@@ -38,13 +40,22 @@ def study_parser(name: str, description: str | None, sets: int) -> argparse.Argu
 
 
 def gather(
-    name: str, work: Callable[..., Row], items: Sequence[tuple[Any, ...]], options: argparse.Namespace
+    name: str,
+    work: Callable[..., Row],
+    items: Sequence[tuple[Any, ...]],
+    options: argparse.Namespace,
+    depends: str = "",
 ) -> list[Row]:
-    """Return ``work(*item)`` of all items and keep the rows; when interrupted, the next call goes on."""
+    """Return ``work(*item)`` of all items and keep the rows; when interrupted, the next call goes on.
+
+    Rows found before the interruption count only if no source has changed since, nor `depends`, which
+    stands for files that the work reads.
+    """
+    key = " ".join([name, depends, *(source_digest(HERE.parent / package) for package in PACKAGES)])
     unfinished = options.rows.with_suffix(".unfinished")
     rows = list(
         sweep(partial(_each, work), items, chunk=1, jobs=options.jobs, cluster=options.cluster, what=name,
-              quiet=False, resume=Resume(unfinished, name))
+              quiet=False, resume=Resume(unfinished, key))
     )  # fmt: skip
     lines = [{"measured": machine(), "seed": options.seed}, *rows]
     write_text(options.rows, "".join(json.dumps(line) + "\n" for line in lines))

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 CONNECT_S = 10.0  # patience with a scheduler that does not answer
 
+SOURCES = (".py", ".json", ".yaml")
+
 T = TypeVar("T")
 R = TypeVar("R")
 
@@ -57,15 +59,18 @@ class Resume:
         write_text(self._file(piece), json.dumps(results))
 
     def _file(self, piece: Sequence[Any]) -> Path:
-        digest = hashlib.sha256("\0".join([_source_digest(), self.key, repr(list(piece))]).encode())
+        parts = [source_digest(Path(__file__).resolve().parent), self.key, repr(list(piece))]
+        digest = hashlib.sha256("\0".join(parts).encode())
         return self.folder / f"{digest.hexdigest()[:32]}.json"
 
 
-@lru_cache(maxsize=1)
-def _source_digest() -> str:
+@lru_cache
+def source_digest(package: Path) -> str:
+    """Return a hash of a package's programs and of the tables and robots that come with it."""
     digest = hashlib.sha256()
-    for file in sorted(Path(__file__).resolve().parent.rglob("*.py")):
-        digest.update(file.read_bytes())
+    for file in sorted(package.rglob("*")):
+        if file.suffix in SOURCES:
+            digest.update(file.read_bytes())
     return digest.hexdigest()
 
 

@@ -72,10 +72,36 @@ def geometric_path(
     problem: Problem, planner: str, curves: Curves, iterations: int, seed: int
 ) -> Array | None:
     """Return the poses (n, 3) of a path that the strip can follow, or None."""
-    from ompl import base, geometric
+    from ompl import geometric
 
     seeded(seed)
     kind, method = planner.split("-")
+    setup = strip_setup(problem, kind, curves)
+    info = setup.getSpaceInformation()
+    made = {"bitstar": geometric.BITstar, "rrtconnect": geometric.RRTConnect}[method](info)
+    setup.setPlanner(made)
+    setup.setup()
+    setup.solve(counted(iterations, setup.haveExactSolutionPath))
+    if not setup.haveExactSolutionPath():
+        return None
+    path = setup.getSolutionPath()
+    if method == "rrtconnect":  # BIT* is already short; the simplifier's rounds are counted, not timed
+        simplifier = geometric.PathSimplifier(info)
+        simplifier.reduceVertices(path, 50, 50, 0.5)
+    return poses_along(path)
+
+
+def strip_setup(problem: Problem, kind: str, curves: Curves) -> Any:
+    """Return OMPL's set-up of the strip in the maze, without a planner.
+
+    Parameters
+    ----------
+    problem : Problem
+    kind : {"dubins", "rs"}
+    curves : Curves
+    """
+    from ompl import base, geometric
+
     space = (base.DubinsStateSpace if kind == "dubins" else base.ReedsSheppStateSpace)(curves.radius_m)
     xmin, ymin, xmax, ymax = problem.maze.bounds
     bounds = base.RealVectorBounds(2)
@@ -91,16 +117,11 @@ def geometric_path(
     _set(start, problem.start.x, problem.start.y, problem.start.heading)
     _set(goal, *_goal_pose(problem))
     setup.setStartAndGoalStates(start, goal, 0.01)
-    made = {"bitstar": geometric.BITstar, "rrtconnect": geometric.RRTConnect}[method](info)
-    setup.setPlanner(made)
-    setup.setup()
-    setup.solve(counted(iterations, setup.haveExactSolutionPath))
-    if not setup.haveExactSolutionPath():
-        return None
-    path = setup.getSolutionPath()
-    if method == "rrtconnect":  # BIT* is already short; the simplifier's rounds are counted, not timed
-        simplifier = geometric.PathSimplifier(info)
-        simplifier.reduceVertices(path, 50, 50, 0.5)
+    return setup
+
+
+def poses_along(path: Any) -> Array | None:
+    """Return the poses (n, 3) of OMPL's path; None where it is not what it says."""
     if not path.check():  # some planners call paths exact that are not
         return None
     path.interpolate(max(2, int(path.length() / STEP_M)))

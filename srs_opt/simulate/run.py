@@ -64,6 +64,11 @@ def simulate(
             f"{duration_s:g} s at {1 / gait.period_s:g} Hz are more than {MOST_CYCLES} cycles; "
             "lower the duration or the frequency"
         )
+    if duration_s < LEAST_CYCLES * gait.period_s:
+        raise InputError(
+            f"{duration_s:g} s at {1 / gait.period_s:g} Hz are less than {LEAST_CYCLES:g} cycles; "
+            "raise the duration or the frequency"
+        )
     if gait.segments != robot.segments:
         raise InputError(f"gait drives {gait.segments} segments, robot '{robot.name}' has {robot.segments}")
     before = compiled.compile_seconds

@@ -1,0 +1,55 @@
+"""Long studies keep their rows, go on after an interruption, and drop rows that other sources made."""
+
+import argparse
+import json
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from benchmarks import stored
+
+
+def squared(log, k):
+    """One row; the log counts how often it was worked out. Item 3 is interrupted while `stop` exists."""
+    if k == 3 and (Path(log).parent / "stop").exists():
+        raise KeyboardInterrupt
+    with Path(log).open("a") as stream:
+        stream.write("x")
+    return {"k": k, "square": k * k}
+
+
+@pytest.fixture
+def options(tmp_path):
+    return argparse.Namespace(rows=tmp_path / "study.jsonl", jobs=1, cluster=None, seed=7)
+
+
+def interrupted(tmp_path, options, depends):
+    (tmp_path / "stop").touch()
+    with pytest.raises(KeyboardInterrupt):
+        stored.gather("study", partial(squared, tmp_path / "log"), [(k,) for k in range(5)], options, depends)
+    (tmp_path / "stop").unlink()
+    assert not options.rows.exists()
+    assert len((tmp_path / "log").read_text()) == 3
+
+
+@pytest.mark.parametrize(("depends", "worked"), [("same table", 5), ("another table", 8)])
+def test_a_study_goes_on_where_it_was(tmp_path, options, depends, worked):
+    interrupted(tmp_path, options, "same table")
+    rows = stored.gather(
+        "study", partial(squared, tmp_path / "log"), [(k,) for k in range(5)], options, depends
+    )
+    assert [row["square"] for row in rows] == [0, 1, 4, 9, 16]
+    assert len((tmp_path / "log").read_text()) == worked
+    first, *kept = map(json.loads, options.rows.read_text().splitlines())
+    assert kept == rows
+    assert first["seed"] == 7
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["log", "study.jsonl"]
+
+
+def test_rows_of_an_older_planner_are_not_mixed_in(tmp_path, options, monkeypatch):
+    interrupted(tmp_path, options, "")
+    digest = stored.source_digest
+    monkeypatch.setattr(stored, "source_digest", lambda package: digest(package) + "changed")
+    stored.gather("study", partial(squared, tmp_path / "log"), [(k,) for k in range(5)], options)
+    assert len((tmp_path / "log").read_text()) == 8
