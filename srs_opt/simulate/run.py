@@ -17,6 +17,7 @@ from srs_opt.simulate.integrate import TOLERANCE_M_S, Integrator, Trajectory
 from srs_opt.simulate.timeline import Timeline
 
 LONGEST_S, MOST_CYCLES = 100_000.0, 1_000_000
+LEAST_CYCLES = 1e-6  # shorter ones drown in rounding
 _CHECKED_CYCLES = 4
 
 
