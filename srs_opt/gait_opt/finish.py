@@ -6,7 +6,7 @@ from srs_opt.gait import Gait
 from srs_opt.gait_opt.aim import aimed, evened, on_ticks
 from srs_opt.gait_opt.collocation.problem import CycleProblem
 from srs_opt.gait_opt.ladder import orbits_of
-from srs_opt.gait_opt.score import score
+from srs_opt.gait_opt.score import Score, score
 from srs_opt.gait_opt.starts import turn_miss
 
 _TURN_RAD_S = 5e-3
@@ -20,12 +20,13 @@ def finished(problem: CycleProblem, gait: Gait) -> Gait:
     straight = goal.radius_m is None and not goal.turn_rate_rad_s and not goal.tightest
     if straight and all(len(pairs) == 1 for pairs in gait.intervals):
         even = on_ticks(evened(gait), limits.tick_s, limits.frequency_hz)
-        if _total(problem, even) > _total(problem, gait) - _LOST:
+        as_found = _score(problem, gait)
+        if _score(problem, even).total > as_found.total - _LOST * as_found.scale:
             return even
     if goal.tightest:
         return gait
     return on_ticks(aimed(gait, turn_miss(problem), _TURN_RAD_S, 0.1), limits.tick_s, limits.frequency_hz)
 
 
-def _total(problem: CycleProblem, gait: Gait) -> float:
-    return score(problem, gait, orbits_of(problem, gait)).total
+def _score(problem: CycleProblem, gait: Gait) -> Score:
+    return score(problem, gait, orbits_of(problem, gait))

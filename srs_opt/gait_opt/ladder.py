@@ -3,12 +3,14 @@
 Friction that nearly sticks makes the problem stiff and its landscape rugged; smoothed friction does not.
 Every rung starts from the *simulated* orbit of the gait so far (primal feasible whatever the mesh) and may
 move the gait by a limited reach; a rung whose limits bind is repeated. What counts at the end is the
-simulated gait, never the collocation's own number.
+gait simulated with the robot's own friction, the best that any rung led to, never the collocation's own
+number.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -30,6 +32,7 @@ _PATIENT = {"mu_strategy": "monotone", "mu_init": 1e-3, "max_iter": 80}
 # simulation judges every solve: where nothing but the speed counts, a rough optimum soon is worth more than a
 # sharp one late; turns and bands get stuck that way
 _QUICK = {"mu_strategy": "monotone", "mu_init": 1e-4, "tol": 1e-3, "max_iter": 40}
+_QUICK_ELEMENTS, _FINEST_QUICK = ((0.1, 24), (0.03, 28), (0.01, 36), (0.004, 50)), 60
 _UNIFORM_SHARE = 0.5  # of the mesh; the rest follows the simulation's steps
 _STATE_LIMIT = 4.0  # scaled states stay below
 
@@ -101,10 +104,28 @@ Report = Callable[[Step, Score], None]
 
 def ladder(own_m_s: float, reach: float = 0.1, *, quick: bool = False) -> tuple[Rung, ...]:
     """Return the rungs from strongly smoothed friction to the robot's own `own_m_s`."""
+    if quick:
+        return _quick_ladder(own_m_s, reach)
     rungs = [Rung(v, n, reach, 4) for v, n in ((0.1, 40), (0.03, 40), (0.01, 50)) if v > 1.5 * own_m_s]
     rungs += [Rung(0.004, 64, reach / 2, 2)] if own_m_s < 0.003 else []
     rungs += [Rung(v, 80, reach / 3, 2) for v in (0.002, 0.001, 0.0005) if v > 1.5 * own_m_s]
-    return tuple(replace(r, quick=quick) for r in (*rungs, Rung(own_m_s, 80, reach / 3, 3)))
+    return (*rungs, Rung(own_m_s, 80, reach / 3, 3))
+
+
+def _quick_ladder(own_m_s: float, reach: float) -> tuple[Rung, ...]:
+    """Return rungs on coarse meshes, down to twice the robot's own smoothing or to that itself.
+
+    From there the exact switch times are the better next step: they need a fine mesh only once.
+    """
+    speeds = [v for v in (0.1, 0.03, 0.01, 0.004, 0.002, 0.001) if v > 1.5 * own_m_s]
+    if not speeds or speeds[-1] > 2 * own_m_s:
+        speeds.append(own_m_s)
+    rungs = []
+    for v in speeds:
+        elements = next((n for least, n in _QUICK_ELEMENTS if v >= least), _FINEST_QUICK)
+        stiff = v < 0.01
+        rungs.append(Rung(v, elements, reach / 2 if stiff else reach, 2 if stiff else 4, quick=True))
+    return tuple(rungs)
 
 
 def orbits_of(
@@ -132,11 +153,20 @@ def climb(problem: CycleProblem, gait: Gait, rungs: tuple[Rung, ...], report: Re
         If the starting gait itself has no steady state.
     """
     steps: list[Step] = []
+    best: Climb | None = None
     for rung in rungs:
         gait, taken = _rung(problem, gait, rung, report)
         steps += taken
+        with suppress(NoAnswerError):
+            found = _judged(problem, gait)
+            best = found if best is None or found.score.total > best.score.total else best
+    return replace(best or _judged(problem, gait), steps=tuple(steps))
+
+
+def _judged(problem: CycleProblem, gait: Gait) -> Climb:
+    """Return the gait with its orbits and score at the robots' own friction, no steps taken."""
     orbits = orbits_of(problem, gait)
-    return Climb(gait, orbits, score(problem, gait, orbits), tuple(steps))
+    return Climb(gait, orbits, score(problem, gait, orbits))
 
 
 def _rung(problem: CycleProblem, gait: Gait, rung: Rung, report: Report | None) -> tuple[Gait, list[Step]]:
@@ -163,7 +193,7 @@ def _rung(problem: CycleProblem, gait: Gait, rung: Rung, report: Report | None) 
             gait, orbits, gained, best = trial, trial_orbits, found.total - best.total, found
         if report is not None:
             report(steps[-1], best)
-        if better and (not binding or gained < 1e-4):
+        if better and (not binding or gained < 1e-4 * best.scale):
             break
         if not better:
             reach /= 3
@@ -174,6 +204,12 @@ def _rung(problem: CycleProblem, gait: Gait, rung: Rung, report: Report | None) 
 
 def mesh_for(orbits: tuple[Orbit, ...], elements: int) -> Mesh:
     """Return a mesh as dense as the steps that the simulation needed, half uniform, shared by all robots."""
+    grid, level = elements_until(orbits, elements)
+    return Mesh(np.interp(np.arange(elements + 1), level, grid))
+
+
+def elements_until(orbits: tuple[Orbit, ...], elements: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return fractions of the cycle after the first switch and how many elements should end before each."""
     grid = np.linspace(0.0, 1.0, 1001)
     level = elements * _UNIFORM_SHARE * grid
     for orbit in orbits:
@@ -185,7 +221,7 @@ def mesh_for(orbits: tuple[Orbit, ...], elements: int) -> Mesh:
             grid + first, np.concatenate([grid, grid[1:] + 1]), np.concatenate([count, count[1:] + 1])
         )
         level = level + elements * (1 - _UNIFORM_SHARE) / len(orbits) * (shifted - shifted[0])
-    return Mesh(np.interp(np.arange(elements + 1), level * elements / level[-1], grid))
+    return grid, level * elements / level[-1]
 
 
 def solve_from(
@@ -200,8 +236,9 @@ def solve_from(
     mesh = mesh or mesh_for(orbits, rung.elements)
     p = problem.program(mesh.elements)
     z, scales = unknowns_from_orbits(p.layout, list(problem.robots), list(orbits), mesh)
-    parameters = problem.parameters(p, mesh, scales, rung.friction_speed_m_s)
-    z[p.layout.merit] = score(problem, gait, orbits).merit
+    worth = score(problem, gait, orbits)
+    parameters = problem.parameters(p, mesh, scales, rung.friction_speed_m_s, worth.scale)
+    z[p.layout.merit] = worth.merit / worth.scale
     unknowns, rows, binding = bounded(problem, p, z, reach)
     solution = p.solve(z, parameters, unknowns, rows, options=_QUICK if rung.quick else _PATIENT)
     return solution, p, binding(solution.z)

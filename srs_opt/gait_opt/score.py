@@ -14,6 +14,8 @@ from srs_opt.orbit.steady import Orbit
 
 _PENALTY = 5.0
 _LEVER_M = 0.1
+_SLOW = 0.1  # merit (m/s, where speed counts) below which tolerances shrink with it
+_LEAST_SCALE = 0.01
 
 
 @dataclass(frozen=True)
@@ -27,6 +29,11 @@ class Score:
     def total(self) -> float:
         """Merit less a penalty for misses: what gaits are compared by."""
         return self.merit - _PENALTY * self.miss
+
+    @property
+    def scale(self) -> float:
+        """What tolerances on the merit are multiplied by: 1, less for a robot that hardly moves."""
+        return float(np.clip(abs(self.merit) / _SLOW, _LEAST_SCALE, 1.0))
 
 
 def score(problem: CycleProblem, gait: Gait, orbits: tuple[Orbit, ...]) -> Score:

@@ -184,7 +184,8 @@ def _distinct(climbs: dict[int, Climb]) -> list[int]:
     """Return the starts, best first, without those that came to the same optimum as a better one."""
     kept: list[int] = []
     for k in sorted(climbs, key=lambda k: -climbs[k].score.total):
-        if all(abs(climbs[k].score.total - climbs[j].score.total) > _ALIKE for j in kept):
+        mine = climbs[k].score
+        if all(abs(mine.total - climbs[j].score.total) > _ALIKE * mine.scale for j in kept):
             kept.append(k)
     return kept
 

@@ -10,14 +10,17 @@ from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait
 from srs_opt.gait_opt.collocation.explain import explained
 from srs_opt.gait_opt.collocation.guess import gait_from, switches_of, unknowns_from_orbits
-from srs_opt.gait_opt.collocation.phases import element_counts, exchanged, phase_times, switch_order
+from srs_opt.gait_opt.collocation.phases import Cuts, exchanged, phase_cuts, phase_times, switch_order
 from srs_opt.gait_opt.collocation.problem import CycleProblem
-from srs_opt.gait_opt.collocation.refine import defects, refined_counts
-from srs_opt.gait_opt.ladder import Report, Rung, Step, bounded, orbits_of
+from srs_opt.gait_opt.collocation.refine import defects, refined_cuts
+from srs_opt.gait_opt.ladder import Report, Rung, Step, bounded, elements_until, orbits_of
 from srs_opt.gait_opt.score import Score, score
 from srs_opt.orbit.steady import Orbit
 
-_IPOPT = {"mu_strategy": "monotone", "mu_init": 1e-4, "max_iter": 100}
+# the start is near: let the barrier begin low and push nothing off its limits
+_IPOPT = {
+    "mu_strategy": "monotone", "mu_init": 1e-5, "bound_push": 1e-6, "bound_frac": 1e-6, "max_iter": 100,
+}  # fmt: skip
 _ROUNDS = 4
 _ELEMENTS = 90
 _MOST_ELEMENTS = 160
@@ -50,9 +53,9 @@ def optimize_switch_times(
     claimed = orbits[0].speed_m_s
     steps: list[Step] = []
     order = switch_order(_switches(gait))
-    counts = element_counts(_switches(gait), order, _ELEMENTS)
+    cuts = phase_cuts(_switches(gait), order, *elements_until(orbits, _ELEMENTS))
     for _ in range(_ROUNDS):
-        trial, step, met, finer, binding = _solve(problem, gait, orbits, order, counts, reach)
+        trial, step, met, finer, binding = _solve(problem, gait, orbits, order, cuts, reach)
         try:
             trial_orbits = orbits_of(problem, trial)
         except NoAnswerError:
@@ -62,19 +65,19 @@ def optimize_switch_times(
         step = replace(step, simulated_m_s=trial_orbits[0].speed_m_s)
         steps.append(step)
         gain = found.total - best.total
-        if not step.trouble and gain > -_TOLERATED_LOSS:
+        if not step.trouble and gain > -_TOLERATED_LOSS * best.scale:
             claimed = step.speed_m_s
         if gain > 0:
             gait, orbits, best = trial, trial_orbits, found
         if report is not None:
             report(step, best)
-        settled = met is None and (finer == counts).all() and not step.trouble
-        if settled and (gain <= _GAINED or not binding):
+        settled = met is None and finer is cuts and not step.trouble
+        if settled and (gain <= _GAINED * best.scale or not binding):
             break
-        counts = finer
+        cuts = finer
         if gain > 0 and met is not None:
             order = met
-            counts = element_counts(_switches(gait), order, int(counts.sum()))
+            cuts = phase_cuts(_switches(gait), order, *elements_until(orbits, sum(c.size - 1 for c in cuts)))
         elif gain <= 0:
             reach /= 3
     return Polished(gait, orbits, best, claimed, tuple(steps))
@@ -89,24 +92,25 @@ def _solve(
     gait: Gait,
     orbits: tuple[Orbit, ...],
     order: np.ndarray,
-    counts: np.ndarray,
+    cuts: Cuts,
     reach: float,
-) -> tuple[Gait, Step, np.ndarray | None, np.ndarray, bool]:
+) -> tuple[Gait, Step, np.ndarray | None, Cuts, bool]:
     """Solve once.
 
     Returns
     -------
     gait, step
     order : the exchanged one, None if no switches met
-    counts : refined
+    cuts : refined; the same object where nothing is to refine
     binding : whether the gait wanted to move further than `reach`
     """
     own = max(r.friction_speed_m_s for r in problem.robots)
-    mesh, times = phase_times(_switches(gait), order, counts)
+    mesh, times = phase_times(_switches(gait), order, cuts)
     p = problem.program(mesh.elements, times)
     z, scales = unknowns_from_orbits(p.layout, list(problem.robots), list(orbits), mesh)
-    z[p.layout.merit] = score(problem, gait, orbits).merit
-    parameters = problem.parameters(p, mesh, scales, own)
+    worth = score(problem, gait, orbits)
+    z[p.layout.merit] = worth.merit / worth.scale
+    parameters = problem.parameters(p, mesh, scales, own, worth.scale)
     unknowns, rows, binding = bounded(problem, p, z, reach)
     solution = p.solve(z, parameters, unknowns, rows, options=_IPOPT)
     trial = gait_from(p.layout, solution.z)
@@ -116,8 +120,8 @@ def _solve(
         Rung(own, mesh.elements, reach), speed, speed, solution.iterations,
         explained(p, solution, trial), mesh.elements, float(defect.max()),
     )  # fmt: skip
-    finer = counts
-    if mesh.elements < _MOST_ELEMENTS:
-        finer = refined_counts(defect, counts, _DEFECT)
+    finer = cuts
+    if mesh.elements < _MOST_ELEMENTS and defect.max() > _DEFECT:
+        finer = refined_cuts(defect, cuts, _DEFECT)
     met = exchanged(solution.z[2 : 2 + p.layout.switches], order)
     return trial, step, met, finer, binding(solution.z)

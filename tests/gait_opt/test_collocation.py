@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 from srs_opt.gait import Wave
 from srs_opt.gait_opt.collocation.guess import gait_of, switches_of, unknowns_from_orbits
 from srs_opt.gait_opt.collocation.layout import Mesh
-from srs_opt.gait_opt.collocation.phases import element_counts, exchanged, phase_times, switch_order
+from srs_opt.gait_opt.collocation.phases import exchanged, phase_cuts, phase_times, switch_order
 from srs_opt.gait_opt.collocation.point import PointKind, linear_shape
 from srs_opt.gait_opt.collocation.problem import CycleProblem
 from srs_opt.gait_opt.goal import Goal, Limits
@@ -19,6 +19,7 @@ from srs_opt.orbit.steady import steady_gait
 from srs_opt.robot import wpi_srs
 
 ROBOT = wpi_srs()
+ENDS = np.array([0.0, 1.0])  # of the cycle; elements spread evenly
 GAIT = Wave(1.7, 47.0, (0.3, 1.2, 1.95, 2.9), (0.1, -0.2, 0.05, 0.3)).gait()
 
 
@@ -66,7 +67,7 @@ def test_derivatives_with_phases_that_end_at_switches():
     smooth = replace(ROBOT, friction_speed_m_s=0.1)
     switches = switches_of(GAIT, GAIT.intervals[0][0][0])
     order = switch_order(switches)
-    mesh, times = phase_times(switches, order, element_counts(switches, order, 24))
+    mesh, times = phase_times(switches, order, phase_cuts(switches, order, ENDS, 24 * ENDS))
     case = problem()
     p = case.program(mesh.elements, times)
     z, scales = unknowns_from_orbits(p.layout, [ROBOT], [steady_gait(smooth, GAIT)], mesh)
@@ -116,8 +117,8 @@ def test_collocation_converges_to_the_simulated_orbit():
     order = switch_order(switches)
     errors = []
     for elements in (16, 48):
-        counts = element_counts(switches, order, elements)
-        mesh, times = phase_times(switches, order, counts)
+        cuts = phase_cuts(switches, order, ENDS, elements * ENDS)
+        mesh, times = phase_times(switches, order, cuts)
         case = CycleProblem(
             (smooth,), "complex", Goal("turn", turn_rate_rad_s=orbit.turn_rate_rad_s), Limits()
         )

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
-from srs_opt.gait_opt.collocation.layout import DEGREE, NODES, Mesh
+from srs_opt.gait_opt.collocation.layout import NODES, Mesh
 from srs_opt.gait_opt.collocation.program import Times
 
+Cuts = tuple[np.ndarray, ...]
 COINCIDENT = 1e-7  # cycles; switches closer than this are one instant, their order is free
 
 
@@ -17,14 +18,30 @@ def switch_order(switches: np.ndarray) -> np.ndarray:
     return np.argsort(fraction, kind="stable")
 
 
-def element_counts(switches: np.ndarray, order: np.ndarray, elements: int) -> np.ndarray:
-    """Return elements per phase, about `elements` in all: by length, one at least."""
+def phase_cuts(switches: np.ndarray, order: np.ndarray, places: np.ndarray, until: np.ndarray) -> Cuts:
+    """Return where elements end inside every phase, fractions of the phase from 0 to 1.
+
+    Parameters
+    ----------
+    places, until : arrays
+        Fractions of the cycle after the first switch, and how many elements should end before each of them;
+        both ascend. Every phase gets one element at least.
+    """
     fraction = np.mod(switches - switches[0] + COINCIDENT, 1.0)[order]
-    lengths = np.diff(np.append(fraction, 1.0 + fraction[0]))
-    return np.maximum(np.round(lengths * elements).astype(int), 1)
+    starts = np.append(fraction, 1.0 + fraction[0]) - fraction[0]
+    levels = np.interp(starts, places, until)
+    cuts = []
+    for k in range(order.size):
+        length = starts[k + 1] - starts[k]
+        count = max(round(levels[k + 1] - levels[k]), 1)
+        even = np.linspace(levels[k], levels[k + 1], count + 1)
+        ends = (np.interp(even, until, places) - starts[k]) / length if length > 0 else even[:2] * 0
+        ends[0], ends[-1] = 0.0, 1.0
+        cuts.append(ends)
+    return tuple(cuts)
 
 
-def phase_times(switches: np.ndarray, order: np.ndarray, counts: np.ndarray) -> tuple[Mesh, Times]:
+def phase_times(switches: np.ndarray, order: np.ndarray, cuts: Cuts) -> tuple[Mesh, Times]:
     """Return the mesh at these switch times and how it moves with them.
 
     Parameters
@@ -33,8 +50,7 @@ def phase_times(switches: np.ndarray, order: np.ndarray, counts: np.ndarray) -> 
         Switch times as the program has them (fractions of the period, whole cycles allowed).
     order : int array
         From `switch_order`.
-    counts : int array
-        Elements of every phase.
+    cuts : from `phase_cuts`
     """
     n = switches.size
     whole = np.floor(switches - switches[0] + COINCIDENT)
@@ -42,7 +58,8 @@ def phase_times(switches: np.ndarray, order: np.ndarray, counts: np.ndarray) -> 
     starts = np.append(start[order], 1.0 + start[order[0]])
     phase_lengths = np.diff(starts)
     lengths, offsets = np.zeros((n, n)), np.zeros(n)
-    rows, columns, data, constant, turns, edges = [], [], [], [], [], []
+    rows, columns, constant, turns, edges = [], [], [], [], []
+    data: list[float] = []
     point = 0
     for k in range(n):
         a, b = order[k], order[(k + 1) % n]
@@ -52,22 +69,19 @@ def phase_times(switches: np.ndarray, order: np.ndarray, counts: np.ndarray) -> 
         offsets[k] = shift_b - shift_a
         begun = set(order[: k + 1].tolist())
         last = [whole[j] * -1.0 - (0.0 if j in begun else 1.0) for j in range(n)]
-        for e in range(counts[k]):
-            edges.append(starts[k] + phase_lengths[k] * e / counts[k])
+        for begin, width in zip(cuts[k], np.diff(cuts[k])):
+            edges.append(starts[k] + phase_lengths[k] * begin)
             for c in NODES:
-                share = (e + c) / counts[k]
-                for row, weights in ((2 * point, (1 - share, share)), (2 * point + 1, (-1.0, 1.0))):
-                    scale = 1.0 if row % 2 == 0 else 1.0 / counts[k]
+                share = begin + c * width
+                for row, weights in ((2 * point, (1 - share, share)), (2 * point + 1, (-width, width))):
                     rows += [row, row]
                     columns += [a, b]
-                    data += [scale * weights[0], scale * weights[1]]
-                    constant.append(scale * (weights[0] * shift_a + weights[1] * shift_b))
+                    data += weights
+                    constant.append(weights[0] * shift_a + weights[1] * shift_b)
                 turns.append(last)
                 point += 1
     edges.append(starts[-1])
-    matrix = sparse.csr_matrix(
-        sparse.coo_matrix((data, (rows, columns)), shape=(2 * DEGREE * int(counts.sum()), n))
-    )
+    matrix = sparse.csr_matrix(sparse.coo_matrix((data, (rows, columns)), shape=(2 * point, n)))
     times = Times(matrix, np.array(constant), np.array(turns), lengths, offsets)
     return Mesh(np.array(edges) - starts[0]), times
 

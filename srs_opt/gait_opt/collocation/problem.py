@@ -76,9 +76,14 @@ class CycleProblem:
         return program(self.layout(elements), *arguments)
 
     def parameters(
-        self, p: Program, mesh: Mesh, scales: list[np.ndarray], friction_speed_m_s: float
+        self,
+        p: Program,
+        mesh: Mesh,
+        scales: list[np.ndarray],
+        friction_speed_m_s: float,
+        merit_unit: float = 1.0,
     ) -> np.ndarray:
-        """Return the program's parameter vector at one smoothing speed."""
+        """Return the program's parameters at one smoothing speed, the merit in units of `merit_unit`."""
         limits, goal = self.limits.for_robot(self.robots[0]), self.goal
         numbers = [
             limits.min_dwell_s,
@@ -86,6 +91,7 @@ class CycleProblem:
             goal.envelope_m or 1.0,
             limits.chamber_volume_m3 or 0.0,
             weight_n(self.robots[0]),
+            merit_unit,
         ]
         if p.times is None:
             place = np.stack([mesh.points(), np.repeat(np.diff(mesh.edges), 3)], axis=1).ravel()

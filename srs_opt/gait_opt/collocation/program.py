@@ -24,7 +24,8 @@ from srs_opt.gait_opt.collocation.sparse import Gather, hessian_gather, jacobian
 from srs_opt.model.registry import build
 from srs_opt.processes import interrupt_not_lost
 
-GOAL_NUMBERS = ("min_dwell_s", "radius_m", "envelope_m", "chamber_volume_m3", "weight_n")
+GOAL_NUMBERS = ("min_dwell_s", "radius_m", "envelope_m", "chamber_volume_m3", "weight_n", "merit_unit")
+_MINIMUM_DEGREE = 0  # MUMPS's ordering: quicker here than its own choice; METIS draws at random, bits differ
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,7 @@ def goal_rows(
             "tightest": -10 * speed / turn_rate,
             "slim": -(left + right),
         }[objective]
-        rows.append(value - merit)
+        rows.append(value / number["merit_unit"] - merit)
         if envelope:
             rows.append(number["envelope_m"] / ENVELOPE_UNIT_M - left - right)
     head = ca.vertcat(shared, *own)
@@ -235,8 +236,9 @@ class Program:
         if key not in self._solvers:
             ipopt = {
                 "print_level": 0, "sb": "yes", "mu_strategy": "adaptive", "max_iter": 300, "tol": 1e-6,
-                "linear_solver": "mumps", "acceptable_tol": 1e-5, "acceptable_iter": 8,
-                "warm_start_init_point": "no", "nlp_scaling_method": "none",
+                "linear_solver": "mumps", "mumps_pivot_order": _MINIMUM_DEGREE,
+                "acceptable_tol": 1e-5, "acceptable_iter": 8, "warm_start_init_point": "no",
+                "nlp_scaling_method": "none",
                 **changes,
             }  # fmt: skip
             options = {

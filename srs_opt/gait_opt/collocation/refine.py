@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from srs_opt.gait_opt.collocation.layout import DEGREE, NODES, PRESSURE_UNIT_KPA, Mesh
+from srs_opt.gait_opt.collocation.phases import Cuts
 from srs_opt.gait_opt.collocation.point import BODY, point_functions
 from srs_opt.gait_opt.collocation.program import Program, Solution
 
@@ -63,10 +66,12 @@ def defects(p: Program, solution: Solution, parameters: np.ndarray, mesh: Mesh, 
     return np.abs(slope - rates)[:, :, : min(3, BODY)].max(axis=(1, 2))
 
 
-def refined_counts(defect: np.ndarray, counts: np.ndarray, tolerance: float) -> np.ndarray:
-    """Return elements per phase that should bring every defect to `tolerance`; counts only grow."""
-    phase = np.repeat(np.arange(counts.size), counts)
-    worst = np.zeros(counts.size)
-    np.maximum.at(worst, phase, defect)
-    growth = np.clip((np.maximum(worst, 1e-12) / tolerance) ** (1 / _ORDER), 1.0, _MOST_GROWTH)
-    return np.ceil(counts * growth).astype(int)
+def refined_cuts(defect: np.ndarray, cuts: Cuts, tolerance: float) -> Cuts:
+    """Return cuts with every element whose defect is above `tolerance` split into as many as should do."""
+    growth = np.clip((np.maximum(defect, 1e-12) / tolerance) ** (1 / _ORDER), 1.0, _MOST_GROWTH)
+    parts = iter(np.ceil(growth).astype(int))
+    finer = []
+    for ends in cuts:
+        pieces = [np.linspace(a, b, next(parts) + 1)[:-1] for a, b in pairwise(ends)]
+        finer.append(np.append(np.concatenate(pieces), 1.0))
+    return tuple(finer)
