@@ -192,7 +192,7 @@ class Search:
                 break
             before, current = current, self._pruned(self.examine(better))
             same = current.hypothesis.label == before.hypothesis.label
-            if same or current.adequate or _stuck(before.hypothesis, current.hypothesis):
+            if same or explained(null, current) or _stuck(before.hypothesis, current.hypothesis):
                 break
         return current, self.fitted
 
