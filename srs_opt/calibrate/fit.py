@@ -159,7 +159,7 @@ def fit(
             converged = damping > 1e4
         promised = within_reach(coordinates, grams, point)
         excess = promised - beat
-        if done >= TRIED and excess > HOPELESS and excess > 0.5 * behind:
+        if done >= TRIED and _hopeless(excess, behind, iterations - done):
             break
         behind = excess
         missing = objective(coordinates, grams, point, 1.0) - promised
@@ -179,6 +179,12 @@ def fit(
         converged,
         at_start,
     )
+
+
+def _hopeless(excess: float, behind: float, left: int) -> bool:
+    """Whether a fit stays behind the one to beat, if it goes on catching up as it did last."""
+    rate = min(max(excess, 0.0) / behind, 1.0) if behind > 0 else 1.0
+    return excess > HOPELESS and (rate > 0.5 or excess * rate**left > HOPELESS)
 
 
 def objective(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -95,6 +96,8 @@ def _summary(found: Discrepancy) -> str:
 
 def main(argv: list[str] | None = None) -> int:
     """Run the command; return its exit status."""
+    # the processes share the cores already; threads of the linear algebra would only get in their way
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
     return run_command(build_parser(), run, argv)
 
 
