@@ -53,8 +53,8 @@ def run(quick: bool) -> Section:
                 ratios[f"{name}, {label}, exponent"] = exponent(n, cost)
         if not quick:
             pictures.append(growth_picture("growth_" + "_".join(name.split()[:2]), name, curves))
-    notes = ["Costs in s. Compiling happens once per structure and machine; code is kept."]
-    return Section("Growth", ["what grows", "cost of", "s", "exponent"], rows, notes, ratios, pictures)
+    notes = ["Processor times in s. Compiling happens once per structure and machine; code is kept."]
+    return Section("Growth", ["what grows", "time of", "size: s", "exponent"], rows, notes, ratios, pictures)
 
 
 def _links(sizes: list[int]) -> dict[str, Curve]:

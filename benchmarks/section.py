@@ -94,8 +94,8 @@ def _growth_figure(x: str, curves: dict[str, tuple[Sequence[float], Sequence[flo
         axes.loglog(sizes, costs, marker=marker, markersize=3, color=colour, label=told)
     every = sorted({size for sizes, _ in curves.values() for size in sizes})
     axes.xaxis.set(major_locator=FixedLocator(every), minor_locator=NullLocator())
-    axes.set_xticklabels([f"{size:.3g}" for size in every])
-    axes.set(xlabel=x, ylabel="cost (s)")
+    axes.set_xticklabels([f"{size:.3g}" if size < 100 else f"{size:.0f}" for size in every])
+    axes.set(xlabel=x, ylabel="processor time (s)")
     figure.legend(loc="outside upper left")
     return figure
 

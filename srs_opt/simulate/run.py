@@ -17,6 +17,7 @@ from srs_opt.simulate.integrate import TOLERANCE_M_S, Integrator, Trajectory
 from srs_opt.simulate.timeline import Timeline
 
 LONGEST_S, MOST_CYCLES = 100_000.0, 1_000_000
+LEAST_CYCLES = 1e-6  # less is rounding, not motion
 _CHECKED_CYCLES = 4
 
 
@@ -63,6 +64,11 @@ def simulate(
         raise InputError(
             f"{duration_s:g} s at {1 / gait.period_s:g} Hz are more than {MOST_CYCLES} cycles; "
             "lower the duration or the frequency"
+        )
+    if duration_s < LEAST_CYCLES * gait.period_s:
+        raise InputError(
+            f"{duration_s:g} s at {1 / gait.period_s:g} Hz are less than {LEAST_CYCLES:g} cycles; "
+            "raise the duration or the frequency"
         )
     if gait.segments != robot.segments:
         raise InputError(f"gait drives {gait.segments} segments, robot '{robot.name}' has {robot.segments}")

@@ -46,6 +46,8 @@ CASES = [
     ("srs_opt.simulate", ["--offset", "1.2"], 2, "between -1 and 1"),
     ("srs_opt.simulate", ["--duration", "1e9"], 2, "duration"),
     ("srs_opt.simulate", ["--frequency", "1e9"], 2, "cycles"),
+    ("srs_opt.simulate", ["--frequency", "1e-308"], 2, "less than 1e-06 cycles"),
+    ("srs_opt.simulate", ["--duration", "1e-12"], 2, "less than 1e-06 cycles"),
     ("srs_opt.simulate", ["--seed", "-1"], 2, "whole number from 0"),
     ("srs_opt.simulate", ["--robot", "{tmp}/absent.yaml"], 2, "no such file"),
     ("srs_opt.simulate", ["--robot", "{tmp}"], 2, "is a folder"),
