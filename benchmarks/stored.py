@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import argparse
+import importlib
 import json
 import os
 import shutil
+import sys
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from benchmarks.section import machine
 from srs_opt.command import positive_int
@@ -54,13 +56,21 @@ def gather(
     key = " ".join([name, depends, *(source_digest(HERE.parent / package) for package in PACKAGES)])
     unfinished = options.rows.with_suffix(".unfinished")
     rows = list(
-        sweep(partial(_each, work), items, chunk=1, jobs=options.jobs, cluster=options.cluster, what=name,
-              quiet=False, resume=Resume(unfinished, key))
+        sweep(partial(_each, _importable(work)), items, chunk=1, jobs=options.jobs, cluster=options.cluster,
+              what=name, quiet=False, resume=Resume(unfinished, key))
     )  # fmt: skip
     lines = [{"measured": machine(), "seed": options.seed}, *rows]
     write_text(options.rows, "".join(json.dumps(line) + "\n" for line in lines))
     shutil.rmtree(unfinished, ignore_errors=True)
     return rows
+
+
+def _importable(work: Callable[..., Row]) -> Callable[..., Row]:
+    """Return `work` under its module's own name: no other process has the `__main__` that a study runs as."""
+    if getattr(work, "__module__", None) != "__main__":
+        return work
+    module = importlib.import_module(sys.modules["__main__"].__spec__.name)
+    return cast("Callable[..., Row]", getattr(module, work.__name__))
 
 
 def _each(work: Callable[..., Row], items: Sequence[tuple[Any, ...]]) -> list[Row]:

@@ -2,8 +2,10 @@
 
 import argparse
 import json
+import sys
 from functools import partial
 from pathlib import Path
+from types import FunctionType, SimpleNamespace
 
 import pytest
 
@@ -53,3 +55,14 @@ def test_rows_of_an_older_planner_are_not_mixed_in(tmp_path, options, monkeypatc
     monkeypatch.setattr(stored, "source_digest", lambda package: digest(package) + "changed")
     stored.gather("study", partial(squared, tmp_path / "log"), [(k,) for k in range(5)], options)
     assert len((tmp_path / "log").read_text()) == 8
+
+
+def test_a_study_run_as_a_program_finds_its_work_by_name(monkeypatch):
+    """What keeps something per process (``lru_cache``) cannot be sent to another one from ``__main__``."""
+    from benchmarks import planner_narrow
+
+    program = SimpleNamespace(__spec__=SimpleNamespace(name="benchmarks.planner_narrow"))
+    monkeypatch.setitem(sys.modules, "__main__", program)
+    work = FunctionType(planner_narrow.attempt.__code__, {"__name__": "__main__"}, "attempt")
+    assert work.__module__ == "__main__"
+    assert stored._importable(work) is planner_narrow.attempt
