@@ -41,7 +41,7 @@ MARGIN_M = 0.005
 TICK_S = 0.001
 OFFSETS = (0.0, 0.15, 0.3, 0.45, 0.6, 0.7, 0.8, 0.9)
 # frequency Hz, pressure kPa, lag rad: from slim to strong
-GRID = ((2.0, 26.0, 1.0), (2.0, 30.0, 0.9), (2.0, 40.0, 0.9), (2.0, 48.0, 0.9), (2.0, 55.0, 1.4))
+GRID = ((2.0, 26.0, 1.0), (2.0, 30.0, 0.9), (2.0, 40.0, 0.9), (2.0, 48.0, 0.9), (2.0, 55.0, 0.9))
 QUICK_GRID = GRID[2:3]
 MAZES = ("first", "u_turn", "slalom", "rooms", "narrow", "blocks", "door 72", "door 66", "door 60", "cells 1")
 SLOWEST_M_S = 0.03
