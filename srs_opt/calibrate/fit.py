@@ -150,7 +150,9 @@ def fit(
             new = math.inf
         gain = now - new
         if gain >= -(CONVERGED if temper < 3 else 5 * CONVERGED):
-            enough = CONVERGED if temper < 3 else max(CONVERGED, 2e-3 * abs(now))
+            # far off, rough is enough; not where this step has just come near
+            far_off = temper_of(new_grams, correlated) >= 3
+            enough = max(CONVERGED, 2e-3 * abs(now)) if far_off else CONVERGED
             converged = gain < enough and damping < 1
             point, grams = moved, new_grams
             damping = 0.0 if damping < 0.1 else damping * 0.1
