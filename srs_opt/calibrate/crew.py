@@ -20,17 +20,14 @@ if TYPE_CHECKING:
 
 
 def helped(
-    experiment: Experiment, jobs: int = 1, cluster: str | None = None, often: Sequence[Trial] = ()
+    experiment: Experiment, jobs: int = 1, cluster: str | None = None
 ) -> AbstractContextManager[object]:
-    """Return a context in which `jobs` processes, or the cluster at that address, share the trials.
-
-    Those asked for `often` by themselves are dealt out first, so that every process gets some.
-    """
+    """Return a context in which `jobs` processes, or the cluster at that address, share the trials."""
     if cluster is not None:
         from srs_opt.calibrate.cluster import ClusterCrew
 
         return ClusterCrew(experiment, cluster)
-    return Crew(experiment, jobs, often) if jobs > 1 else nullcontext()
+    return Crew(experiment, jobs) if jobs > 1 else nullcontext()
 
 
 class Crew:
@@ -42,17 +39,11 @@ class Crew:
         Its model, trials and noise go to the workers.
     jobs : int
         Number of processes, the calling one included.
-    often : sequence of Trial
-        Trials that are asked for by themselves, too.
     """
 
-    def __init__(self, experiment: Experiment, jobs: int, often: Sequence[Trial] = ()) -> None:
+    def __init__(self, experiment: Experiment, jobs: int) -> None:
         self.experiment = experiment
-        frequent = {t.name for t in often}
-        order = sorted(
-            experiment.trials,
-            key=lambda t: (t.name not in frequent, -t.time_s[-1] * max(t.frequency_hz, 0.5)),
-        )
+        order = sorted(experiment.trials, key=lambda t: -t.time_s[-1] * max(t.frequency_hz, 0.5))
         shares = [order[k::jobs] for k in range(jobs)]
         self.own = {t.name for t in shares[0]}
         self._members: list[tuple[Any, Connection, set[str]]] = []

@@ -150,9 +150,7 @@ def fit(
             new = math.inf
         gain = now - new
         if gain >= -(CONVERGED if temper < 3 else 5 * CONVERGED):
-            # far off, rough is enough; not where this step has just come near
-            far_off = temper_of(new_grams, correlated) >= 3
-            enough = max(CONVERGED, 2e-3 * abs(now)) if far_off else CONVERGED
+            enough = CONVERGED if temper < 3 else max(CONVERGED, 2e-3 * abs(now))
             converged = gain < enough and damping < 1
             point, grams = moved, new_grams
             damping = 0.0 if damping < 0.1 else damping * 0.1
@@ -161,7 +159,7 @@ def fit(
             converged = damping > 1e4
         promised = within_reach(coordinates, grams, point)
         excess = promised - beat
-        if done >= TRIED and _hopeless(excess, behind, iterations - done):
+        if done >= TRIED and excess > HOPELESS and excess > 0.5 * behind:
             break
         behind = excess
         missing = objective(coordinates, grams, point, 1.0) - promised
@@ -181,12 +179,6 @@ def fit(
         converged,
         at_start,
     )
-
-
-def _hopeless(excess: float, behind: float, left: int) -> bool:
-    """Whether a fit stays behind the one to beat, if it goes on catching up as it did last."""
-    rate = min(max(excess, 0.0) / behind, 1.0) if behind > 0 else 1.0
-    return excess > HOPELESS and (rate > 0.5 or excess * rate**left > HOPELESS)
 
 
 def objective(

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 from srs_opt.calibrate.fit import sum_eliminated
 from srs_opt.discrepancy.search import Examined
 
-ODD, ALONE = 3.0, 5.0  # times the usual misfit; times the next trial's excess over the noise
-CHANCE = 3.0  # standard deviations of a trial's misfit that are no excess
+ODD = 3.0
 STAGES = {
     "actuation": "valves to curvature",
     "body": "geometry of the body",
@@ -74,23 +72,11 @@ def misfit_by_trial(examined: Examined) -> dict[str, float]:
 
 
 def odd_trials(examined: Examined) -> tuple[str, ...]:
-    """Return the few trials whose misfit is several times that of most, worst first.
-
-    Where all misfits are small, so that no trial's is several times another's, it may still be one trial
-    that holds all there is: the one whose excess over the noise is several times the next.
-    """
-    grams = {n: g for n, g in examined.linearisation.grams.items() if g.scattered}
-    misfit = {n: m for n, m in misfit_by_trial(examined).items() if n in grams}
-    order = sorted(misfit, key=lambda n: -misfit[n])
-    usual = misfit[order[len(order) // 2]]
-    odd = [n for n in order if misfit[n] > ODD * usual and misfit[n] > 1.2]
-    if odd:
-        return tuple(odd) if len(odd) <= len(misfit) // 4 else ()
-    if len(order) < 2:
-        return ()
-    by_chance = CHANCE * math.sqrt(2 / grams[order[0]].count)
-    first, second = (misfit[n] - 1 for n in order[:2])
-    return (order[0],) if first > ALONE * max(second, by_chance) else ()
+    """Return the few trials whose misfit is several times that of most, worst first."""
+    misfit = {n: m for n, m in misfit_by_trial(examined).items() if examined.linearisation.grams[n].scattered}
+    usual = sorted(misfit.values())[len(misfit) // 2]
+    odd = sorted((n for n, m in misfit.items() if m > ODD * usual and m > 1.2), key=lambda n: -misfit[n])
+    return tuple(odd) if len(odd) <= len(misfit) // 4 else ()
 
 
 __all__ = ["Place", "locate", "misfit_by_trial", "odd_trials", "stages", "sum_eliminated"]

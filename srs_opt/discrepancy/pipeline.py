@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from srs_opt.calibrate.coordinates import Candidate, all_candidates, base_coordinates
 from srs_opt.calibrate.crew import helped
-from srs_opt.calibrate.fit import Experiment
+from srs_opt.calibrate.fit import Experiment, start_point
 from srs_opt.calibrate.model import Model
 from srs_opt.calibrate.noise import noise_sd_m
 from srs_opt.discrepancy.design import NextExperiment, next_experiment, rivals_of
@@ -16,11 +16,13 @@ from srs_opt.discrepancy.hypothesis import Hypothesis
 from srs_opt.discrepancy.locate import Place, locate, odd_trials
 from srs_opt.discrepancy.screen import Score
 from srs_opt.discrepancy.seal import Gap, open_seal
-from srs_opt.discrepancy.search import NULL_ITERATIONS, Examined, Search
+from srs_opt.discrepancy.search import Examined, Search
 from srs_opt.discrepancy.select import Selection, select
-from srs_opt.discrepancy.split import LEAST_OPEN, Split, few, split_trials
+from srs_opt.discrepancy.split import LEAST_OPEN, Split, split_trials
 from srs_opt.discrepancy.verdict import DETECTED, NO_GAP, NOT_TESTABLE, ONE_OF, UNKNOWN, Verdict, judge
 from srs_opt.measurement.records import DataSet
+
+NULL_ITERATIONS = 10
 
 
 @dataclass(frozen=True)
@@ -95,7 +97,7 @@ def find_discrepancy(
     if not split.enough:
         return _not_testable(dataset, split, sd, started)
     experiment = Experiment(Model(dataset.robot, model), (*split.open, *split.sealed), sd, dataset.bench)
-    with helped(experiment, jobs, cluster, few(split.open, seed)):
+    with helped(experiment, jobs, cluster):
         return _examine(dataset, experiment, split, _candidates(dataset, effects), seed, tell, started)
 
 
@@ -111,7 +113,7 @@ def _examine(
     base = base_coordinates(dataset.robot)
     search = Search(experiment, base, candidates, split.open, seed, tell)
     tell(f"calibrating on {len(split.open)} trials")
-    first = search.calibrate()
+    first = search.fit((), start_point(base), NULL_ITERATIONS)
     if first is None:
         why = "the robot as documented cannot be simulated under these trials' conditions"
         return _not_testable(dataset, split, experiment.sd_m, started, why)
@@ -149,22 +151,15 @@ def _examine(
 def contradicting(search: Search, null: Examined) -> tuple[str, ...]:
     """Return the few trials, if any, without which calibration alone explains all the others."""
     odd = odd_trials(null)
-    odd = odd[: len(search.trials) - LEAST_OPEN]
-    # most sets end here: what stays without all of them is not mended by leaving out fewer
-    if not odd or not _explained_without(search, null, odd):
-        return ()
-    counts = range(1, len(odd))
-    return next((odd[:k] for k in counts if _explained_without(search, null, odd[:k])), odd)
-
-
-def _explained_without(search: Search, null: Examined, odd: Sequence[str]) -> bool:
-    """Whether calibration alone explains the trials other than `odd`."""
-    rest = [t for t in search.trials if t.name not in odd]
-    without = Search(search.experiment, search.base, search.candidates, rest, search.seed)
-    found = without.fit((), null.hypothesis.fit.point, NULL_ITERATIONS)
-    if found is None or found.fit.temper > 1:  # far above the noise: no test is needed
-        return False
-    return without.examine(found).detection.p_value >= DETECTED
+    for count in range(1, len(odd) + 1):
+        rest = [t for t in search.trials if t.name not in odd[:count]]
+        if len(rest) < LEAST_OPEN:
+            break
+        without = Search(search.experiment, search.base, search.candidates, rest, search.seed)
+        found = without.fit((), null.hypothesis.fit.point, NULL_ITERATIONS)
+        if found is not None and without.examine(found).detection.p_value >= DETECTED:
+            return odd[:count]
+    return ()
 
 
 def _candidates(dataset: DataSet, effects: Sequence[str] | None) -> tuple[Candidate, ...]:

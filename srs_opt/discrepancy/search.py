@@ -9,16 +9,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from srs_opt.calibrate.coordinates import Candidate, Coordinate
-from srs_opt.calibrate.fit import Experiment, Fit, Point, objective, priors, start_point, sum_eliminated
+from srs_opt.calibrate.fit import Experiment, Fit, Point, priors, sum_eliminated
 from srs_opt.discrepancy.detect import Detection, detect, project
 from srs_opt.discrepancy.functions import Group, ResidualFunctions
 from srs_opt.discrepancy.hypothesis import ITERATIONS, SMALL, Hypothesis, fit_hypothesis
 from srs_opt.discrepancy.screen import Linearisation, Score, expected_start, screen
-from srs_opt.discrepancy.split import few
+from srs_opt.discrepancy.split import spread
 from srs_opt.errors import NoAnswerError
 from srs_opt.measurement.records import Trial
 
-NULL_ITERATIONS = 10
 DEEPEST, ROUNDS = 4, 6  # effects at once; additions or exchanges in all
 ADEQUATE = 0.01  # level at which a fitted model is rejected
 # Friction's smoothing is numerical, and its shape is nobody's physics: long data see the difference. What is
@@ -32,7 +31,7 @@ RIVAL = 6.0
 _CONTENDER = 0.45  # share of the best expected gain that earns a refit
 _NEAR = 40.0  # or this little behind it
 _MOST_REFITS = (5, 4, 3, 3)
-QUICK_ITERATIONS = 6  # with a few trials, before all are asked
+QUICK, QUICK_ITERATIONS = 9, 8  # trials and iterations that refits are tried with before all are asked
 LEFT = 0.6  # share of the misfit that a second or later effect may leave and still count as progress
 FIRM = 10.0  # standard deviations from zero at which an effect is not superfluous, without a refit
 
@@ -104,7 +103,10 @@ class Search:
         self.functions = ResidualFunctions.of(self.trials)
         self.seed = seed
         self._report = report or (lambda message: None)
-        self.quick = few(self.trials, seed)
+        self.quick = self.trials
+        if len(self.trials) > QUICK:
+            few = spread(self.trials, QUICK, np.random.default_rng([seed, 29]))
+            self.quick = tuple(t for t in self.trials if t in few)
         self._fits: dict[tuple[frozenset[str], int], Hypothesis] = {}
 
     @property
@@ -140,14 +142,6 @@ class Search:
         if known is None or found.deviance < known.deviance:
             self._fits[key] = found
         return self._fits[key]
-
-    def calibrate(self) -> Hypothesis | None:
-        """Fit the model without effects: first to some of the trials, which is most of the way."""
-        start = start_point(self.base)
-        if 2 * len(self.quick) < len(self.trials):
-            near = self.fit((), start, NULL_ITERATIONS, trials=self.quick)
-            start = start if near is None else near.fit.point
-        return self.fit((), start, NULL_ITERATIONS)
 
     def examine(self, hypothesis: Hypothesis) -> Examined:
         """Linearise about a fitted hypothesis, test what is left and screen what could explain it."""
@@ -191,8 +185,7 @@ class Search:
             if better is None or not self._worth(better, current.hypothesis):
                 break
             before, current = current, self._pruned(self.examine(better))
-            same = current.hypothesis.label == before.hypothesis.label
-            if same or explained(null, current) or _stuck(before.hypothesis, current.hypothesis):
+            if explained(null, current) or _stuck(before.hypothesis, current.hypothesis):
                 break
         return current, self.fitted
 
@@ -207,22 +200,11 @@ class Search:
                 continue
             start = expected_start(lin, scores[0])
             rest = tuple(c for c in have if c is not dropped)
-            exchanged = (*rest, scores[0].candidate)
-            beat = current.hypothesis if best is None else best
-            tried = self.fit(exchanged, start, QUICK_ITERATIONS, self._on_few(beat), self.quick)
-            if tried is None or tried.deviance > self._on_few(beat) + 2 * RIVAL:
-                continue
-            swapped = self.fit(exchanged, tried.fit.point, beat=beat.deviance)
+            beat = current.hypothesis.deviance if best is None else best.deviance
+            swapped = self.fit((*rest, scores[0].candidate), start, beat=beat)
             if swapped is not None and (best is None or _cost(swapped) < _cost(best)):
                 best = swapped
         return best
-
-    def _on_few(self, hypothesis: Hypothesis) -> float:
-        """Return what a fit to all trials leaves on the few ones, comparable to a fit to those."""
-        fit = hypothesis.fit
-        few_grams = {n: g for n, g in fit.grams.items() if n in {t.name for t in self.quick}}
-        few_grams |= {n: g for n, g in fit.grams.items() if not g.scattered}
-        return objective(fit.coordinates, few_grams, fit.point, 1.0)
 
     def _proposals(self, current: Examined, depth: int) -> list[Score]:
         """Return the candidates that deserve a refit, best first."""

@@ -13,7 +13,6 @@ from srs_opt.measurement.records import Trial
 SEALED_SHARE = 0.25
 LEAST_OPEN, LEAST_SEALED = 3, 1
 FOLDS = 3
-FEW = 5  # trials that a fit is first tried with
 
 
 @dataclass(frozen=True)
@@ -66,14 +65,6 @@ def spread(trials: Sequence[Trial], count: int, rng: np.random.Generator) -> lis
         rest = [t for t in order if t not in chosen]
         chosen.append(min(rest, key=lambda t: sum(_shared(t, c) for c in chosen)))
     return chosen
-
-
-def few(trials: Sequence[Trial], seed: int = 0) -> tuple[Trial, ...]:
-    """Return a few trials, spread over the conditions, on which a hypothesis can be tried cheaply."""
-    if len(trials) <= FEW:
-        return tuple(trials)
-    chosen = spread(trials, FEW, np.random.default_rng([seed, 29]))
-    return tuple(t for t in trials if t in chosen)
 
 
 def _shared(a: Trial, b: Trial) -> int:
