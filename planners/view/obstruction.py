@@ -40,5 +40,5 @@ def save_obstruction_picture(stem: Path, problem: Problem, explanation: Explanat
         close.set_ylim(place.y_m - reach, place.y_m + reach)
         whole.set_title(f"tightest place: {1e3 * place.width_m:.0f} mm")
         name, width = explanation.needs[0]
-        close.set_title(f"dashed: {name} needs {1e3 * width:.0f} mm")
+        close.set_title(f"dashed: {name}\nneeds {1e3 * width:.0f} mm")
     return save_figure(figure, stem)
