@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from srs_opt.command import Answer, Parser, make_parser, run_command, say
+from srs_opt.processes import one_thread_of_linear_algebra
 
 if TYPE_CHECKING:
     from srs_opt.discrepancy.pipeline import Discrepancy
@@ -96,8 +96,7 @@ def _summary(found: Discrepancy) -> str:
 
 def main(argv: list[str] | None = None) -> int:
     """Run the command; return its exit status."""
-    # the processes share the cores already; threads of the linear algebra would only get in their way
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    one_thread_of_linear_algebra()
     return run_command(build_parser(), run, argv)
 
 
