@@ -121,9 +121,9 @@ def robots_of(effect: str, folder: Path) -> tuple[Truth, dict[str, Robot], str]:
 
 def planned(robot: Robot, gait: Gait, maze_file: Path) -> tuple[Problem, Plan | None]:
     """Plan through a maze with uniform waves of the fastest gait's frequency and pressure."""
-    from benchmarks.planner_traverse import family
+    from benchmarks.planner_traverse import grid_family
 
-    table = family(robot, gait.frequency_hz, gait.pressure_kpa, LAG_RAD)
+    table = grid_family(robot, gait.frequency_hz, gait.pressure_kpa, LAG_RAD)
     problem = Problem(robot, table, load_motion(robot, table), load_maze(str(maze_file)), MARGIN_M)
     return problem, solve_with_lattice(problem, max_nodes=20_000, time_limit_s=120.0).plan
 

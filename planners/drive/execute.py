@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planners.drive.contact import BodyWatch
+from planners.drive.halt import halt
 from planners.drive.track import Learned, Where, choose, nearest_node, reference_of
 from planners.motion.robots import undelayed
 from planners.plan.answer import Plan
@@ -27,7 +28,6 @@ from srs_opt.simulate.timeline import Timeline
 Array = NDArray[np.float64]
 ASTRAY_M = 0.06  # farther from the plan than this: plan anew
 STOP_CLEARANCE_M = -0.004  # a cycle predicted to run deeper into a wall than this is not begun
-COAST_S = 1.5  # watched after a stop
 MOST_IDLE = 4  # cycles without progress along the plan
 MOST_REPLANS = 8
 REPLAN_CYCLES = 4000  # looked at when planning anew
@@ -152,16 +152,15 @@ class _Drive:
 
     def _plan_anew(self) -> bool:
         """Look for a way from here; the model takes over place, speed and curvature."""
-        n = self.problem.robot.segments
-        state = self.problem.run.rest()
-        state[:6] = self.state[:6]
-        state[BODY_STATES : BODY_STATES + 2 * n] = self.state[BODY_STATES : BODY_STATES + 2 * n]
         # half the margin is asked for on the way, and where the robot is now, no more than it has
         relaxed = replace(self.problem, margin_m=self.problem.margin_m / 2)
         slack = min(0.0, self.watch.now_m - relaxed.margin_m) - ROUNDING_M
         try:
             result = solve_with_lattice(
-                relaxed, root=Root(state, self.before, slack), time_limit_s=20.0, max_nodes=REPLAN_CYCLES
+                relaxed,
+                root=Root(self._as_planned(), self.before, slack),
+                time_limit_s=20.0,
+                max_nodes=REPLAN_CYCLES,
             )
         except NoAnswerError:
             return False
@@ -169,6 +168,14 @@ class _Drive:
             return False
         self._follow(result.plan)
         return True
+
+    def _as_planned(self) -> Array:
+        """Return the state as the planned robot's model has it."""
+        n = self.problem.robot.segments
+        state = self.problem.run.rest()
+        state[:6] = self.state[:6]
+        state[BODY_STATES : BODY_STATES + 2 * n] = self.state[BODY_STATES : BODY_STATES + 2 * n]
+        return state
 
     def _cycle(self, index: int) -> str | None:
         """Play one cycle; return what ended the drive, if anything."""
@@ -193,9 +200,8 @@ class _Drive:
         return None
 
     def _stop(self, reason: str) -> Execution:
-        """Vent all chambers and watch the robot roll out."""
-        vent = Timeline.vent(self.problem.robot.segments, COAST_S, 0.0)
-        trajectory = self.run.run(vent, self.state)
+        """Bring the robot to rest where there is room for it, and watch."""
+        trajectory = self.run.run(halt(self.problem, self._as_planned()), self.state)
         self.watch.look(trajectory.time_s, trajectory.pose, trajectory.kappa, ends=False)
         return self._done(reason)
 

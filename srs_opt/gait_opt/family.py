@@ -15,7 +15,7 @@ from srs_opt.gait_opt.collocation.problem import CycleProblem
 from srs_opt.gait_opt.finish import finished
 from srs_opt.gait_opt.goal import Goal, Limits
 from srs_opt.gait_opt.ladder import Climb, Rung, climb, ladder
-from srs_opt.gait_opt.starts import turn_miss
+from srs_opt.gait_opt.starts import best_start, turn_miss
 from srs_opt.gait_opt.table import GaitTable, TableGait
 from srs_opt.gait_opt.wishes import Wish, generations, wishes
 from srs_opt.orbit.steady import Orbit, steady_gait
@@ -128,7 +128,9 @@ def _solve(problem: CycleProblem, task: Task) -> Climb:
     own, start = problem.robots[0].friction_speed_m_s, task.start
     if task.wish.after is None:
         return climb(problem, start, ladder(own))
-    if problem.goal.radius_m is not None:
+    if problem.goal.envelope_m is None:
+        start = best_start(problem, start)
+    elif problem.goal.radius_m is not None:
         start = aimed(start, turn_miss(problem), 0.02)
     last = Rung(own, 70, 0.03, 2)
     found = climb(problem, start, (Rung(max(own, 0.004), 60, 0.06, 3), last))

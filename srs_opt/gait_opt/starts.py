@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -13,9 +14,13 @@ from srs_opt.gait import Gait, Wave, published_wave
 from srs_opt.gait_opt.aim import aimed
 from srs_opt.gait_opt.collocation.problem import CycleProblem
 from srs_opt.gait_opt.goal import Goal
+from srs_opt.gait_opt.ladder import orbits_of
+from srs_opt.gait_opt.score import score
 from srs_opt.orbit.steady import steady_gait
 
 _SMOOTHED_M_S = 0.1
+_AIM_RAD_S = 0.02
+_PRESSURE_SHARES, _WAVES_ON_BODY = (0.7, 0.85, 1.0), (0.7, 0.85)
 
 
 def starting_gaits(problem: CycleProblem, count: int, seed: int) -> list[Gait]:
@@ -53,6 +58,43 @@ def steered(problem: CycleProblem, gait: Gait) -> Gait:
         return aimed(gait, turn_miss(problem, _SMOOTHED_M_S), 0.05)
     except NoAnswerError:
         return gait
+
+
+def best_start(problem: CycleProblem, gait: Gait) -> Gait:
+    """Return the best, simulated, of the gait and a few uniform waves, all leaned towards the wanted turn.
+
+    A neighbour's optimum can lead into a corner of the rugged landscape that a plain wave does not know.
+
+    Raises
+    ------
+    NoAnswerError
+        If none of them has a steady state.
+    """
+    found: list[tuple[float, int, Gait]] = []
+    for k, start in enumerate([gait, *_plain_waves(problem)]):
+        with suppress(NoAnswerError):
+            if problem.goal.radius_m is not None:
+                start = aimed(start, turn_miss(problem), _AIM_RAD_S)
+            found.append((score(problem, start, orbits_of(problem, start)).total, -k, start))
+    if not found:
+        raise NoAnswerError("no gait that the search could start from comes to a steady motion")
+    return max(found)[-1]
+
+
+def _plain_waves(problem: CycleProblem) -> list[Gait]:
+    robot, limits = problem.robots[0], problem.limits
+    least, most = limits.pressure_kpa
+    return [
+        Wave.uniform(
+            robot.segments,
+            limits.frequency_hz[1],
+            max(least, share * most),
+            lag * 2 * math.pi / robot.links,
+            0.0,
+        ).gait()
+        for share in _PRESSURE_SHARES
+        for lag in _WAVES_ON_BODY
+    ]
 
 
 def turn_miss(problem: CycleProblem, friction_speed_m_s: float = 0.0) -> Callable[[Gait], float]:
