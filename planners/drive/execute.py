@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from planners.drive.contact import BodyWatch
 from planners.drive.halt import halt
-from planners.drive.track import Learned, Where, choose, nearest_node, reference_of
+from planners.drive.track import Choice, Learned, Where, choose, nearest_node, reference_of
 from planners.motion.robots import undelayed
 from planners.plan.answer import Plan
 from planners.plan.solve import solve_with_lattice
@@ -27,7 +27,8 @@ from srs_opt.simulate.timeline import Timeline
 
 Array = NDArray[np.float64]
 ASTRAY_M = 0.06  # farther from the plan than this: plan anew
-STOP_CLEARANCE_M = -0.004  # a cycle predicted to run deeper into a wall than this is not begun
+STOP_CLEARANCE_M = -0.004  # a cycle that should by table run deeper into a wall than this is not begun
+MOST_TRIED = 8  # gaits, before a cycle is given up
 MOST_IDLE = 4  # cycles without progress along the plan
 MOST_REPLANS = 8
 REPLAN_CYCLES = 4000  # looked at when planning anew
@@ -136,19 +137,39 @@ class _Drive:
         return self._stop(f"the goal was not reached within {self.most_cycles} cycles")
 
     def _next_gait(self) -> int | None:
-        where = Where(self.state[:3].copy(), self.before, float(self.state[3]))
-        choice = choose(self.problem, self.reference, where, self.learned, self.node)
+        choice = self._choice()
         lost = choice.astray_m > ASTRAY_M or self.idle >= MOST_IDLE
         if (lost or choice.clearance_m < STOP_CLEARANCE_M) and self.replans < MOST_REPLANS:
             self.replans += 1
             why = "strayed or stuck" if lost else "nothing fits"
             self.tell(f"cycle {len(self.played)}: {why}, planning anew")
             if self._plan_anew():
-                choice = choose(self.problem, self.reference, where, self.learned, self.node)
+                choice = self._choice()
         if choice.clearance_m < STOP_CLEARANCE_M:
             return None
         self.predicted = choice.displacement
         return choice.gait
+
+    def _choice(self) -> Choice:
+        """Return the best gait that the dynamic model, too, keeps off the walls.
+
+        Where every one that was tried touches them, the first is returned with a clearance that forbids it.
+        """
+        where = Where(self.state[:3].copy(), self.before, float(self.state[3]))
+        state = self._as_planned()
+        tried: list[Choice] = []
+        while len(tried) < MOST_TRIED:
+            barred = [choice.gait for choice in tried]
+            choice = choose(self.problem, self.reference, where, self.learned, self.node, barred)
+            if choice.clearance_m < STOP_CLEARANCE_M or self._simulated_room_m(state, choice.gait) > 0:
+                return choice
+            tried.append(choice)
+        return replace(tried[0], clearance_m=-math.inf)
+
+    def _simulated_room_m(self, state: Array, gait: int) -> float:
+        """Return the planned robot's clearance over a cycle; minus infinity where the model cannot go on."""
+        (cycle,) = self.problem.simulate_all([(state, gait)])
+        return -math.inf if cycle is None else float(self.problem.body.exact(cycle.lines).min())
 
     def _plan_anew(self) -> bool:
         """Look for a way from here; the model takes over place, speed and curvature."""

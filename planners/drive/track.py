@@ -7,7 +7,7 @@ the robot turns by itself. That is what a robot with other friction, a tether or
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -162,9 +162,14 @@ def _beyond(reference: Reference) -> Reference:
 
 
 def choose(
-    problem: Problem, reference: Reference, where: Where, learned: Learned, step: int | None = None
+    problem: Problem,
+    reference: Reference,
+    where: Where,
+    learned: Learned,
+    step: int | None = None,
+    barred: Collection[int] = (),
 ) -> Choice:
-    """Return the best gait for the next cycle.
+    """Return the best gait for the next cycle, none of those `barred`.
 
     `step` is the reference's node that the robot has come to; only nodes near it are looked at, so that
     a plan that crosses itself is followed in order.
@@ -174,7 +179,9 @@ def choose(
     beam = [_Branch(where, 0.0, 0.0, None)]
     for _ in range(HORIZON):
         grown = [
-            new for old in beam for new in ([old] if old.arrived else _grow(problem, near, old, learned))
+            new
+            for old in beam
+            for new in ([old] if old.arrived else _grow(problem, near, old, learned, barred))
         ]
         grown.sort(key=lambda branch: branch.cost + branch.ahead)
         beam = grown[:BEAM]
@@ -190,8 +197,10 @@ def nearest_node(reference: Reference, pose: Array, after: int) -> int:
     return after + int(np.hypot(*(window - pose[:2]).T).argmin())
 
 
-def _grow(problem: Problem, reference: Reference, branch: _Branch, learned: Learned) -> list[_Branch]:
-    """Return the branch with every gait played after it, the best few."""
+def _grow(
+    problem: Problem, reference: Reference, branch: _Branch, learned: Learned, barred: Collection[int]
+) -> list[_Branch]:
+    """Return the branch with every gait played after it, the best few; those `barred` do not come first."""
     motion, where = problem.motion, branch.where
     move = motion.move(0.0, 0.0, 0.0, where.gait, where.speed_m_s)
     local = learned.apply(move.pose, motion.period_s)
@@ -207,6 +216,8 @@ def _grow(problem: Problem, reference: Reference, branch: _Branch, learned: Lear
     speed = move.speed_m_s * learned.stretches(len(move.speed_m_s))
     place = np.concatenate([pose[:, -1, :2], (pose[:, -1, 2] + motion.course[:-1])[:, None]], axis=1)
     offset = _offset(reference, place, speed)
+    if branch.first is None:
+        offset[list(barred)] = math.inf
     order = np.argsort(offset, kind="stable")[: 3 * BEAM]
     lines = body_in_room(motion.body[where.gait, order, 1::_THIN], pose[order, 1::_THIN])
     room = _room(problem, lines)

@@ -66,8 +66,9 @@ class Trajectory:
         """Return pose (m, 3) and curvature (m, N-1) at other times, by cubic interpolation."""
         from scipy.interpolate import PchipInterpolator
 
-        pose = PchipInterpolator(self.time_s, self.pose, axis=0)(time_s)
-        kappa = PchipInterpolator(self.time_s, self.kappa, axis=0)(time_s)
+        with np.errstate(over="ignore"):  # its harmonic means of slopes near zero, which come out as zero
+            pose = PchipInterpolator(self.time_s, self.pose, axis=0)(time_s)
+            kappa = PchipInterpolator(self.time_s, self.kappa, axis=0)(time_s)
         return pose, kappa
 
 
