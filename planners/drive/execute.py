@@ -31,6 +31,7 @@ STOP_CLEARANCE_M = -0.004  # a cycle that should by table run deeper into a wall
 MOST_TRIED = 8  # gaits, before a cycle is given up
 MOST_IDLE = 4  # cycles without progress along the plan
 MOST_REPLANS = 8
+MOST_HALTS = 3  # from which the robot sets off again
 REPLAN_CYCLES = 4000  # looked at when planning anew
 PATIENCE = 3.0  # times the plan's cycles
 
@@ -115,7 +116,7 @@ class _Drive:
         self.state = self.run.rest(start.x, start.y, start.heading)
         self.before = problem.motion.rest
         self.learned = Learned()
-        self.replans = 0
+        self.replans = self.halts = 0
         self.played: list[int] = []
         self._follow(plan)
         self.most_cycles = 20 + math.ceil(PATIENCE * len(plan.gaits))
@@ -130,7 +131,10 @@ class _Drive:
         while len(self.played) < self.most_cycles:
             gait = self._next_gait()
             if gait is None:
-                return self._stop("no gait keeps the body off the walls and no other way was found")
+                reason = "no gait keeps the body off the walls and no other way was found"
+                if self.halts == MOST_HALTS or not self._halt() or not self._plan_anew():
+                    return self._stop(reason)
+                continue
             outcome = self._cycle(gait)
             if outcome is not None:
                 return self._done(outcome)
@@ -221,10 +225,20 @@ class _Drive:
         return None
 
     def _stop(self, reason: str) -> Execution:
-        """Bring the robot to rest where there is room for it, and watch."""
+        if self.before != self.problem.motion.rest:
+            self._halt()
+        return self._done(reason)
+
+    def _halt(self) -> bool:
+        """Bring the robot to rest where there is room for it; return whether it came to no harm."""
+        self.halts += 1
         trajectory = self.run.run(halt(self.problem, self._as_planned()), self.state)
         self.watch.look(trajectory.time_s, trajectory.pose, trajectory.kappa, ends=False)
-        return self._done(reason)
+        self.state = trajectory.final
+        self.before = self.problem.motion.rest
+        if not self.watch.touched:
+            self.tell(f"cycle {len(self.played)}: halted, looking for a way from rest")
+        return not self.watch.touched
 
     def _done(self, outcome: str) -> Execution:
         w = self.watch

@@ -34,11 +34,16 @@ _THIN = 3  # every third sample of a cycle is looked at
 
 
 class Reference(NamedTuple):
-    """The plan as nodes: place and course (n, 3), speed (n,), time to go (n,)."""
+    """The plan as nodes: place and course (n, 3), speed (n,), time to go (n,), gait played (n,)."""
 
     pose: Array
     speed_m_s: Array
     left_s: Array
+    gait: NDArray[np.int64]
+
+    def part(self, nodes: slice) -> Reference:
+        """Return some of the nodes."""
+        return Reference(self.pose[nodes], self.speed_m_s[nodes], self.left_s[nodes], self.gait[nodes])
 
 
 @dataclass(frozen=True)
@@ -142,7 +147,7 @@ def reference_of(problem: Problem, plan: Plan) -> Reference:
     cycle = np.minimum(np.searchsorted(ends, times, side="right") - 1, len(plan.gaits) - 1)
     speed = np.where(backwards[cycle], -speed, speed)
     pose = np.stack([x, y, np.interp(times, ends, course)], axis=1)
-    return _beyond(Reference(pose, speed, c.time_s[-1] - times))
+    return _beyond(Reference(pose, speed, c.time_s[-1] - times, np.array(plan.gaits)[cycle]))
 
 
 def _beyond(reference: Reference) -> Reference:
@@ -158,6 +163,7 @@ def _beyond(reference: Reference) -> Reference:
         np.concatenate([reference.pose, line]),
         np.append(reference.speed_m_s, np.full(far.size, speed)),
         np.append(reference.left_s, later),
+        np.append(reference.gait, np.full(far.size, reference.gait[-1])),
     )
 
 
@@ -175,7 +181,7 @@ def choose(
     a plan that crosses itself is followed in order.
     """
     window = slice(None) if step is None else slice(max(step - 12, 0), step + 5 * NODES_PER_CYCLE)
-    near = Reference(reference.pose[window], reference.speed_m_s[window], reference.left_s[window])
+    near = reference.part(window)
     beam = [_Branch(where, 0.0, 0.0, None)]
     for _ in range(HORIZON):
         grown = [
@@ -216,9 +222,10 @@ def _grow(
     speed = move.speed_m_s * learned.stretches(len(move.speed_m_s))
     place = np.concatenate([pose[:, -1, :2], (pose[:, -1, 2] + motion.course[:-1])[:, None]], axis=1)
     offset = _offset(reference, place, speed)
-    if branch.first is None:
-        offset[list(barred)] = math.inf
     order = np.argsort(offset, kind="stable")[: 3 * BEAM]
+    order = np.union1d(order, _planned(reference, where.pose))  # which nothing may resemble
+    if branch.first is None:
+        order = np.setdiff1d(order, list(barred))
     lines = body_in_room(motion.body[where.gait, order, 1::_THIN], pose[order, 1::_THIN])
     room = _room(problem, lines)
     grown = []
@@ -234,6 +241,12 @@ def _grow(
         ahead = float(offset[gait]) if arrival is None else 0.0
         grown.append(_Branch(after, cost, ahead, first, arrival is not None))
     return grown
+
+
+def _planned(reference: Reference, pose: Array) -> NDArray[np.int64]:
+    """Return the gaits that the plan plays near a place, one or two."""
+    node = int(np.hypot(*(reference.pose[:, :2] - pose[:2]).T).argmin())
+    return reference.gait[node : node + NODES_PER_CYCLE // 2 + 1]
 
 
 def _room(problem: Problem, lines: Array) -> Array:

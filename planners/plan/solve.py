@@ -14,7 +14,7 @@ from planners.search.lattice import LatticeSearch, LatticeSettings
 from planners.search.problem import ROUNDING_M, Problem
 from planners.search.tree import Root, at_rest
 
-CHUNK = 100  # nodes between looks at the clock
+CHUNK = 50  # nodes between looks at the clock
 LOOK_FIRST = 100  # nodes before the widths are looked at
 TOO_NARROW = "no way with these gaits: even the widest route is too narrow for every gait of the table"
 BACK = 3  # cycles before a failure from where the way is searched again, more at every attempt

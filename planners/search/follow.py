@@ -33,7 +33,7 @@ def reference_along(problem: Problem, path: Array) -> Reference:
     room = problem.field.clearance(np.stack([x, y], axis=1)) - problem.margin_m
     speed = best[np.clip(np.searchsorted(reach, room, side="right") - 1, 0, None)]
     left = np.concatenate([np.cumsum((np.diff(at) / speed[1:])[::-1])[::-1], [0.0]])
-    return Reference(np.stack([x, y, heading], axis=1), sign * speed, left)
+    return Reference(np.stack([x, y, heading], axis=1), sign * speed, left, np.zeros(0, np.int64))
 
 
 def follow(problem: Problem, reference: Reference) -> list[Step] | None:

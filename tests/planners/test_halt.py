@@ -32,7 +32,7 @@ def test_vented_it_rolls_as_far_as_friction_lets_it(before_wall, robot):
     rolls_m = SPEED_M_S**2 / (2 * robot.friction_tangential * 9.81)
     left_m = 0.02
     problem, state = before_wall(rolls_m + left_m)
-    assert room_of(problem, state, vented(problem)) == pytest.approx(left_m, abs=0.002)
+    assert room_of(problem, problem.run, state, vented(problem)) == pytest.approx(left_m, abs=0.002)
 
 
 def test_vents_at_once_where_there_is_room(before_wall):
@@ -42,7 +42,7 @@ def test_vents_at_once_where_there_is_room(before_wall):
 
 def test_brakes_where_venting_would_touch(before_wall):
     problem, state = before_wall(0.15)
-    assert room_of(problem, state, vented(problem)) <= 0
+    assert room_of(problem, problem.run, state, vented(problem)) <= 0
     chosen = halt(problem, state)
-    assert chosen.valve.any() and room_of(problem, state, chosen) > 0
+    assert chosen.valve.any() and room_of(problem, problem.run, state, chosen) > 0
     assert not chosen.valve[:, -1].any() and np.isclose(chosen.duration_s[-1], COAST_S)
