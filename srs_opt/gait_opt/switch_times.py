@@ -19,7 +19,8 @@ from srs_opt.orbit.steady import Orbit
 
 # the start is near: let the barrier begin low and push nothing off its limits
 _IPOPT = {
-    "mu_strategy": "monotone", "mu_init": 1e-5, "bound_push": 1e-6, "bound_frac": 1e-6, "max_iter": 100,
+    "mu_strategy": "monotone", "mu_init": 1e-6, "bound_push": 1e-6, "bound_frac": 1e-6, "max_iter": 100,
+    "tol": 1e-5,
 }  # fmt: skip
 _ROUNDS = 4
 _ELEMENTS = 90
