@@ -58,10 +58,11 @@ def _less_asked(problem: CycleProblem, asked: CycleProblem, orbits: tuple[Orbit,
 def finished(problem: CycleProblem, gait: Gait) -> Gait:
     """Return the gait on ticks, with the turn that rounding and discretization moved put right."""
     goal, limits = problem.goal, problem.limits
-    gait = on_ticks(gait, limits.tick_s, limits.frequency_hz)
+    exact = gait
+    gait = on_ticks(exact, limits.tick_s, limits.frequency_hz)
     straight = goal.radius_m is None and not goal.turn_rate_rad_s and not goal.tightest
     if straight and all(len(pairs) == 1 for pairs in gait.intervals):
-        even = on_ticks(evened(gait), limits.tick_s, limits.frequency_hz)
+        even = on_ticks(evened(exact), limits.tick_s, limits.frequency_hz)
         as_found = _score(problem, gait)
         if _score(problem, even).total > as_found.total - _LOST * as_found.scale:
             return even

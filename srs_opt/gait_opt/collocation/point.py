@@ -163,7 +163,8 @@ def _shape(
 ) -> tuple[ca.SX, ca.SX, ca.SX]:
     """Return curvatures, their rates, and the rates of the actuators' deviation from the closed form.
 
-    `closed` stacks what `_linear_curvature` returns. Relaxed, the actuators' states are collocated themselves.
+    `closed` stacks what `_linear_curvature` returns. Relaxed, the actuators' states are
+    collocated themselves.
     """
     if kind.relaxed:
         own = actuator.unstack(deviation)
@@ -273,7 +274,7 @@ def point_functions(kind: PointKind) -> PointFunctions:
 
         if what == "value":
             return function(out)
-        # each curvature depends on few of the unknowns: by the chain rule derivatives need half the operations
+        # each curvature depends on few of the unknowns: the chain rule halves the operations
         inner = ca.jacobian(curvature, y)
         if what == "slope":
             return function(ca.jacobian(out, y) + ca.jacobian(out, closed) @ inner)
