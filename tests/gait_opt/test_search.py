@@ -9,7 +9,7 @@ import threading
 import numpy as np
 import pytest
 
-from srs_opt.errors import InputError
+from srs_opt.errors import InputError, NoAnswerError
 from srs_opt.gait import Gait, Wave, published_wave
 from srs_opt.gait_opt import search as search_module
 from srs_opt.gait_opt.__main__ import main
@@ -213,6 +213,12 @@ def test_aiming_hits_a_turn_rate():
     gait = published_wave(ROBOT, 2.0, 50.0).gait()
     hit = aimed(gait, lambda g: steady_gait(ROBOT, g).turn_rate_rad_s - 0.6, 1e-2)
     assert steady_gait(ROBOT, hit).turn_rate_rad_s == pytest.approx(0.6, abs=0.011)
+
+
+def test_leaning_stops_before_intervals_meet():
+    pairs = ((0.0, 0.1), (0.11, 0.25))
+    with pytest.raises(NoAnswerError):
+        leaned(Gait(0.5, 45.0, (pairs,) * 4), 0.05)
 
 
 def test_end_for_end_backs_up_exactly():
