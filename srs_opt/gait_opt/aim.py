@@ -21,7 +21,13 @@ def leaned(gait: Gait, cycles: float) -> Gait:
     change = cycles * period / 2
     lengths = [(off - on) % period for pairs in gait.intervals for on, off in pairs]
     shortest, longest = min(lengths) / period, max(lengths) / period
-    if shortest + cycles < _LEAST_SHARE or longest + cycles > 1 - _LEAST_SHARE:
+    gaps = [
+        (on - off) % period
+        for pairs in gait.intervals
+        for (_, off), (on, _) in zip(pairs, (*pairs[1:], pairs[0]))
+    ]
+    room = min(gaps) / period - cycles  # several intervals of a segment must not meet
+    if shortest + cycles < _LEAST_SHARE or longest + cycles > 1 - _LEAST_SHARE or room <= 0:
         raise NoAnswerError("valves would hardly switch any more")
     pairs = tuple(
         tuple(((on - change) % period, (off + change) % period) for on, off in pairs)

@@ -2,24 +2,67 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
+
 from srs_opt.gait import Gait
 from srs_opt.gait_opt.aim import aimed, evened, on_ticks
+from srs_opt.gait_opt.certificate import LIMIT_EXCESS, Certificate, certify
 from srs_opt.gait_opt.collocation.problem import CycleProblem
-from srs_opt.gait_opt.ladder import orbits_of
+from srs_opt.gait_opt.ladder import Report, orbits_of
 from srs_opt.gait_opt.score import Score, score
 from srs_opt.gait_opt.starts import turn_miss
+from srs_opt.gait_opt.switch_times import Polished, optimize_switch_times
+from srs_opt.orbit.steady import Orbit
 
 _TURN_RAD_S = 5e-3
 _LOST = 1e-3  # merit that an exactly straight gait may cost
+_ROUNDS = 3
+
+
+def topped(
+    problem: CycleProblem, gait: Gait, reach: float, report: Report | None = None
+) -> tuple[Polished, Certificate, tuple[Orbit, ...]]:
+    """Return what the switch times' optimization made of `gait`, and the finished gait's certificate, orbits.
+
+    The mesh sees band and curvature at some instants only: where the finished gait exceeds a limit, less is
+    asked for by as much.
+    """
+    asked = problem
+    for _ in range(_ROUNDS):
+        exact = optimize_switch_times(asked, gait, reach, report)
+        certificate, orbits = certify(problem, finished(asked, exact.gait), exact.claimed_m_s)
+        less = _less_asked(problem, asked, orbits)
+        if less is None:
+            break
+        asked, gait = less, exact.gait
+    return exact, certificate, orbits
+
+
+def _less_asked(problem: CycleProblem, asked: CycleProblem, orbits: tuple[Orbit, ...]) -> CycleProblem | None:
+    """Return the problem with tighter limits than `asked`, None where the orbits keep those of `problem`."""
+    band, most = problem.goal.envelope_m, problem.limits.max_curvature_1_m
+    goal, limits = asked.goal, asked.limits
+    if band is not None and goal.envelope_m is not None:
+        excess = max(sum(o.envelope_m) for o in orbits) - band
+        if excess > LIMIT_EXCESS * band:
+            goal = replace(goal, envelope_m=goal.envelope_m - excess)
+    if most is not None and limits.max_curvature_1_m is not None:
+        excess = max(float(np.abs(o.kappa).max()) for o in orbits) - most
+        if excess > LIMIT_EXCESS * most:
+            limits = replace(limits, max_curvature_1_m=limits.max_curvature_1_m - excess)
+    return None if (goal, limits) == (asked.goal, asked.limits) else replace(asked, goal=goal, limits=limits)
 
 
 def finished(problem: CycleProblem, gait: Gait) -> Gait:
     """Return the gait on ticks, with the turn that rounding and discretization moved put right."""
     goal, limits = problem.goal, problem.limits
-    gait = on_ticks(gait, limits.tick_s, limits.frequency_hz)
+    exact = gait
+    gait = on_ticks(exact, limits.tick_s, limits.frequency_hz)
     straight = goal.radius_m is None and not goal.turn_rate_rad_s and not goal.tightest
     if straight and all(len(pairs) == 1 for pairs in gait.intervals):
-        even = on_ticks(evened(gait), limits.tick_s, limits.frequency_hz)
+        even = on_ticks(evened(exact), limits.tick_s, limits.frequency_hz)
         as_found = _score(problem, gait)
         if _score(problem, even).total > as_found.total - _LOST * as_found.scale:
             return even

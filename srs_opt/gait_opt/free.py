@@ -10,15 +10,13 @@ import numpy as np
 
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait
-from srs_opt.gait_opt.certificate import certify
 from srs_opt.gait_opt.collocation.guess import unknowns_from_orbits
 from srs_opt.gait_opt.collocation.layout import PRESSURE_UNIT_KPA, Mesh
 from srs_opt.gait_opt.collocation.problem import CycleProblem
-from srs_opt.gait_opt.finish import finished
+from srs_opt.gait_opt.finish import topped
 from srs_opt.gait_opt.ladder import Rung, bounded, climb, orbits_of
 from srs_opt.gait_opt.score import score
 from srs_opt.gait_opt.search import HERE, Found, Where, search
-from srs_opt.gait_opt.switch_times import optimize_switch_times
 
 ELEMENTS = 40  # of the relaxed problem; valve levels have the same grid
 SMOOTHED_M_S = 0.01
@@ -119,8 +117,7 @@ def _refined(problem: CycleProblem, gait: Gait, wave: Found, say: Callable[[str]
     rungs = (Rung(SMOOTHED_M_S, 60, 0.05, 6), Rung(max(own, 0.004), 70, 0.03, 3), Rung(own, 80, 0.02, 2))
     try:
         top = climb(problem, gait, rungs)
-        exact = optimize_switch_times(problem, top.gait, 0.01)
-        certificate, orbits = certify(problem, finished(problem, exact.gait), exact.claimed_m_s)
+        exact, certificate, orbits = topped(problem, top.gait, 0.01)
     except NoAnswerError as error:
         say(f"a rounded gait leads nowhere: {error}")
         return None

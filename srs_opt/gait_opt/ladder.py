@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,7 @@ from srs_opt.gait_opt.collocation.problem import CycleProblem
 from srs_opt.gait_opt.collocation.program import Program, Solution
 from srs_opt.gait_opt.score import Score, score
 from srs_opt.orbit.steady import Orbit, steady_gait
+from srs_opt.robot import Robot
 
 _FREQUENCY_REACH = 3.0  # per switch reach, Hz
 _PRESSURE_REACH = 4.0  # per switch reach, units of 50 kPa
@@ -128,20 +130,17 @@ def _quick_ladder(own_m_s: float, reach: float) -> tuple[Rung, ...]:
     return tuple(rungs)
 
 
-def orbits_of(
-    problem: CycleProblem,
-    gait: Gait,
-    friction_speed_m_s: float = 0.0,
-    guesses: tuple[Orbit, ...] | None = None,
-) -> tuple[Orbit, ...]:
+def orbits_of(problem: CycleProblem, gait: Gait, friction_speed_m_s: float = 0.0) -> tuple[Orbit, ...]:
     """Return the steady orbits of all robots, friction smoothed at least by `friction_speed_m_s`."""
-    found = []
-    for k, robot in enumerate(problem.robots):
-        own = max(robot.friction_speed_m_s, friction_speed_m_s)
-        smoothed = replace(robot, friction_speed_m_s=own)
-        guess = None if guesses is None else guesses[k].velocity
-        found.append(steady_gait(smoothed, gait, problem.model, guess=guess))
-    return tuple(found)
+    smoothed = (
+        replace(r, friction_speed_m_s=max(r.friction_speed_m_s, friction_speed_m_s)) for r in problem.robots
+    )
+    return tuple(_orbit(robot, gait, problem.model) for robot in smoothed)
+
+
+@lru_cache(maxsize=16)  # where one stage ends the next begins
+def _orbit(robot: Robot, gait: Gait, model: str) -> Orbit:
+    return steady_gait(robot, gait, model)
 
 
 def climb(problem: CycleProblem, gait: Gait, rungs: tuple[Rung, ...], report: Report | None = None) -> Climb:

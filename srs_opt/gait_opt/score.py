@@ -39,7 +39,7 @@ class Score:
 def score(problem: CycleProblem, gait: Gait, orbits: tuple[Orbit, ...]) -> Score:
     """Return the score of a gait from its simulated orbits, one per robot."""
     merits = [_merit(problem, gait, k, o) for k, o in enumerate(orbits)]
-    return Score(min(merits), max(_miss(problem, orbits[0]), *(_band_miss(problem, o) for o in orbits)))
+    return Score(min(merits), max(_miss(problem, orbits[0]), *(_limits_miss(problem, o) for o in orbits)))
 
 
 def transport_cost(problem: CycleProblem, gait: Gait, robot: int, orbit: Orbit) -> float:
@@ -79,6 +79,8 @@ def _miss(problem: CycleProblem, orbit: Orbit) -> float:
     return missed
 
 
-def _band_miss(problem: CycleProblem, orbit: Orbit) -> float:
-    wanted = problem.goal.envelope_m
-    return 0.0 if wanted is None else 10 * float(np.maximum(sum(orbit.envelope_m) - wanted, 0.0))
+def _limits_miss(problem: CycleProblem, orbit: Orbit) -> float:
+    """Return by how much the swept band (10 for a metre) and the curvature (1 for all of it) are exceeded."""
+    band, most = problem.goal.envelope_m, problem.limits.max_curvature_1_m
+    over = 0.0 if band is None else 10 * max(sum(orbit.envelope_m) - band, 0.0)
+    return over if most is None else over + max(float(np.abs(orbit.kappa).max()) / most - 1, 0.0)

@@ -12,21 +12,22 @@ from typing import Any
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait
 from srs_opt.gait_opt.aim import within
-from srs_opt.gait_opt.certificate import Certificate, certify
+from srs_opt.gait_opt.certificate import Certificate
 from srs_opt.gait_opt.collocation.problem import CycleProblem
-from srs_opt.gait_opt.finish import finished
+from srs_opt.gait_opt.finish import topped
 from srs_opt.gait_opt.ladder import Climb, Rung, Step, climb, ladder, orbits_of
 from srs_opt.gait_opt.score import Score, score
 from srs_opt.gait_opt.starts import starting_gaits, steered
-from srs_opt.gait_opt.switch_times import optimize_switch_times
 from srs_opt.orbit.steady import Orbit
 from srs_opt.sweep import Resume, sweep
 
 Say = Callable[[str], None]
 _CARRIED = 2  # starts that are carried to the robot's own friction
 _ALIKE = 1e-3  # merits closer than this are one optimum
-_WARM_REACH = 0.05
-_EXACT_REACH = 0.01
+_EXACT_REACH = 0.01  # cycles that the switches may move in the last stage
+_NEAR_REACH, _MOVED_REACH = 0.05, 0.02  # the same for earlier results that keep the new limits, or do not
+_KEPT = 5e-3  # miss below which a gait keeps the limits
+_MOVED = Rung(0.01, 36, 0.1, 2, quick=True)  # friction that forgives, for results that had to move
 
 
 @dataclass(frozen=True)
@@ -87,7 +88,8 @@ def search(
     starts : int
         The published gait, then quasi-random waves.
     warm : Gait, optional
-        The result of an earlier search: start from it alone, near the top of the ladder.
+        The result of an earlier search: start from it alone, at the top of the ladder. Only where that
+        leads to no certified gait, the whole search follows.
     where : Where
         What climbs the ladder; the result is the same.
 
@@ -103,12 +105,12 @@ def search(
         rungs = ladder(own, quick=problem.goal.only_fast)
         cut = max(len([r for r in rungs if r.friction_speed_m_s >= 0.01]), len(rungs) - 2)
         lower, upper = rungs[:cut], rungs[cut:]
+        reach = _EXACT_REACH
     else:
         candidates, lower = [steered(problem, within(problem.limits, warm))], ()
-        quick = problem.goal.only_fast
-        upper = (Rung(max(own, 0.004), 64, _WARM_REACH, 2, quick),)
-        if not quick:
-            upper += (Rung(own, 80, _WARM_REACH / 2, 2),)
+        near = candidates[0] == warm and score(problem, warm, orbits_of(problem, warm)).miss < _KEPT
+        upper = () if near else (replace(_MOVED, friction_speed_m_s=max(own, _MOVED.friction_speed_m_s)),)
+        reach = _NEAR_REACH if near else _MOVED_REACH
     climbing = _Climbing(problem, len(candidates), say)
     climbs, interrupted = _all(climbing, list(enumerate(candidates)), lower, where)
     if not climbs:
@@ -124,8 +126,10 @@ def search(
     else:
         best = max(climbs, key=lambda k: climbs[k].score.total)
     reached = climbs[best].gait
-    exact = optimize_switch_times(problem, reached, _EXACT_REACH, _reporter(say, best, len(candidates)))
-    certificate, orbits = certify(problem, finished(problem, exact.gait), exact.claimed_m_s)
+    exact, certificate, orbits = topped(problem, reached, reach, _reporter(say, best, len(candidates)))
+    if warm is not None and not certificate.passed and not interrupted:
+        say(f"the earlier gait leads to none that holds ({certificate.failures[0]}): the whole search")
+        return search(problem, starts, seed, say, where=where)
     return Found(
         orbits[0].gait,
         orbits,

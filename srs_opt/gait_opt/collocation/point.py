@@ -141,7 +141,9 @@ class _Symbols:
 
 
 def _linear_curvature(kind: PointKind, s: _Symbols) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """Return the closed-form curvatures, their rates and the valves, (N-1, 1) each."""
+    """Return the closed-form curvatures, their rates and the valves, (N-1, 1) each (none when relaxed)."""
+    if kind.relaxed:
+        return ca.SX(0, 1), ca.SX(0, 1), ca.SX(0, 1)
     parameters, _, actuator = build(kind.structure)
     ones = ca.SX.ones(kind.segments, 1)
     high, low = actuator.target(ones), actuator.target(-ones)
@@ -156,15 +158,18 @@ def _linear_curvature(kind: PointKind, s: _Symbols) -> tuple[ca.SX, ca.SX, ca.SX
     return kappa, rate, valve
 
 
-def _shape(kind: PointKind, actuator: Actuator, s: _Symbols, deviation: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+def _shape(
+    kind: PointKind, actuator: Actuator, s: _Symbols, closed: ca.SX, deviation: ca.SX
+) -> tuple[ca.SX, ca.SX, ca.SX]:
     """Return curvatures, their rates, and the rates of the actuators' deviation from the closed form.
 
-    Relaxed, the actuators' states are collocated themselves.
+    `closed` stacks what `_linear_curvature` returns. Relaxed, the actuators' states are
+    collocated themselves.
     """
     if kind.relaxed:
         own = actuator.unstack(deviation)
         return own.kappa, own.dkappa, actuator.rates(own, s.switches).vector()
-    kappa, dkappa, valve = _linear_curvature(kind, s)
+    kappa, dkappa, valve = ca.vertsplit(closed, kind.segments)
     if actuator.linear:
         return kappa, dkappa, ca.SX(0, 1)
     away = actuator.unstack(deviation)
@@ -194,11 +199,19 @@ def _lateral_reach(m: Mechanics, heading: ca.SX, ahead: ca.SX, aside: ca.SX, ben
     return (2 * room_y - bend * (room_x**2 + room_y**2)) / (1 + distance)
 
 
-def _equations(kind: PointKind, s: _Symbols, p: ca.SX) -> ca.SX:
-    parameters, m, actuator = build(kind.structure)
+def _filled(kind: PointKind, s: _Symbols, p: ca.SX, expression: ca.SX) -> ca.SX:
+    """Return the expression with the numbers of `p`, pressure and frequency the unknowns."""
+    parameters = build(kind.structure)[0]
+    place = parameters.names.index("pressure_kpa")
+    filled = ca.vertcat(p[:place], s.pressure, s.frequency, p[place + 2 :])
+    return ca.substitute(expression, parameters.vector, filled)
+
+
+def _equations(kind: PointKind, s: _Symbols, p: ca.SX, closed: ca.SX) -> ca.SX:
+    _, m, actuator = build(kind.structure)
     x = s.scale * s.x
     velocity, heading, ahead, aside = x[:3], x[3], x[4], x[5]
-    kappa, dkappa, deviation_rate = _shape(kind, actuator, s, x[BODY:])
+    kappa, dkappa, deviation_rate = _shape(kind, actuator, s, closed, x[BODY:])
     body_rate, power = m.velocity_rate(ca.SX.zeros(3, 1), velocity)
     yaw_rate = m.yaw_rate(velocity[2])
     c, sn = ca.cos(heading), ca.sin(heading)
@@ -219,9 +232,7 @@ def _equations(kind: PointKind, s: _Symbols, p: ca.SX) -> ca.SX:
     out = ca.vertcat(duration * rates / s.scale, quadratures, *paths)
     for old, new in ((m.dkappa, dkappa), (m.kappa, kappa)):
         out = ca.substitute(out, old, new)
-    place = parameters.names.index("pressure_kpa")
-    filled = ca.vertcat(p[:place], s.pressure, s.frequency, p[place + 2 :])
-    return ca.substitute(out, parameters.vector, filled)
+    return _filled(kind, s, p, out)
 
 
 @lru_cache(maxsize=1)
@@ -252,22 +263,38 @@ def point_functions(kind: PointKind) -> PointFunctions:
     def make(what: str) -> ca.Function:
         s = _Symbols.of(kind)
         p = ca.SX.sym("p", build(kind.structure)[0].vector.numel())
-        y, out = s.unknowns(), _equations(kind, s, p)
+        curvature = _filled(kind, s, p, ca.vertcat(*_linear_curvature(kind, s)))
+        closed = ca.SX.sym("closed", curvature.numel())
+        y, out = s.unknowns(), _equations(kind, s, p, closed)
         inputs = [y, s.scale, p, s.half_width, s.turns]
+
+        def function(expression: ca.SX, *more: ca.SX) -> ca.Function:
+            known = ca.substitute(expression, closed, curvature)
+            return ca.Function(what, [*inputs, *more], [known], {"cse": True})
+
         if what == "value":
-            return ca.Function("value", inputs, [out], {"cse": True})
+            return function(out)
+        # each curvature depends on few of the unknowns: the chain rule halves the operations
+        inner = ca.jacobian(curvature, y)
         if what == "slope":
-            return ca.Function("slope", inputs, [ca.jacobian(out, y)], {"cse": True})
+            return function(ca.jacobian(out, y) + ca.jacobian(out, closed) @ inner)
         multipliers = ca.SX.sym("multipliers", out.numel())
-        hessian = ca.hessian(ca.dot(multipliers, out), y)[0]
-        return ca.Function("bend", [*inputs, multipliers], [ca.tril(hessian)], {"cse": True})
+        merit = ca.dot(multipliers, out)
+        both, gradient = ca.hessian(merit, ca.vertcat(y, closed))
+        n = y.numel()
+        mixed = both[:n, n:] @ inner
+        weights = ca.SX.sym("weights", closed.numel())
+        curved = ca.substitute(ca.hessian(ca.dot(weights, curvature), y)[0], weights, gradient[n:])
+        return function(
+            ca.tril(both[:n, :n] + mixed + mixed.T + inner.T @ both[n:, n:] @ inner + curved), multipliers
+        )
 
     large = kind.segments > _SEGMENTS_OPTIMIZED or kind.states > BODY
     value, slope, bend = (
         compiled(
             f"gait_opt {what} {kind} {_sources()}",
             partial(make, what),
-            UNOPTIMIZED if large and what == "bend" else FLAGS,
+            UNOPTIMIZED if large and what != "value" else FLAGS,
         )
         for what in ("value", "slope", "bend")
     )
@@ -281,11 +308,8 @@ def linear_shape(kind: PointKind, points: int) -> ca.Function:
     Both are (N-1, points).
     """
     s = _Symbols.of(kind)
-    parameters = build(kind.structure)[0]
-    p = ca.SX.sym("p", parameters.vector.numel())
-    place = parameters.names.index("pressure_kpa")
-    filled = ca.vertcat(p[:place], s.pressure, s.frequency, p[place + 2 :])
-    shapes = [ca.substitute(v, parameters.vector, filled) for v in _linear_curvature(kind, s)[:2]]
+    p = ca.SX.sym("p", build(kind.structure)[0].vector.numel())
+    shapes = [_filled(kind, s, p, v) for v in _linear_curvature(kind, s)[:2]]
     single = ca.Function(
         "shape", [s.switches, s.frequency, s.pressure, s.at, p, s.half_width], shapes, {"cse": True}
     )

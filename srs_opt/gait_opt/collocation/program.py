@@ -26,6 +26,9 @@ from srs_opt.processes import interrupt_not_lost
 
 GOAL_NUMBERS = ("min_dwell_s", "radius_m", "envelope_m", "chamber_volume_m3", "weight_n", "merit_unit")
 _MINIMUM_DEGREE = 0  # MUMPS's ordering: quicker here than its own choice; METIS draws at random, bits differ
+# starts are simulated motions, nearly feasible: steps that leave their neighbourhood follow the linearized
+# friction to where nothing holds any more, and dozens of iterations find no way back
+_FEASIBLE = 3.0
 
 
 @dataclass(frozen=True)
@@ -238,7 +241,7 @@ class Program:
                 "print_level": 0, "sb": "yes", "mu_strategy": "adaptive", "max_iter": 300, "tol": 1e-6,
                 "linear_solver": "mumps", "mumps_pivot_order": _MINIMUM_DEGREE,
                 "acceptable_tol": 1e-5, "acceptable_iter": 8, "warm_start_init_point": "no",
-                "nlp_scaling_method": "none",
+                "nlp_scaling_method": "none", "theta_max_fact": _FEASIBLE,
                 **changes,
             }  # fmt: skip
             options = {
