@@ -111,8 +111,8 @@ class LatticeSolver:
         return None
 
     def _too_narrow(self) -> bool:
-        """Judge the widths, once, when the first search has not found the way."""
-        if self.judged or self.looked_at < LOOK_FIRST or self.beams[:1] == (BEAM,):
+        """Judge the widths, once, when the search does not come on."""
+        if self.judged or self.looked_at < LOOK_FIRST or not self.search.in_doubt:
             return False
         self.judged = True
         return narrower_than_any_gait(self.problem)

@@ -22,7 +22,7 @@ from planners.search.tree import Root, Step, Tree, arrival_index, at_rest, cell_
 TOGETHER = 8  # cycles simulated in one go
 FIRST_LOOK = 32  # gaits whose bodies are looked at first, most promising first
 NARROW, WIDE, WIDTH_TIMES_S = 12, 32, 200.0  # widths of beams, and width times seconds to go
-STALLED = 10  # cycles without coming nearer to the goal after which the beam is given up
+DOUBTFUL, STALLED = 4, 10  # cycles without coming nearer to the goal: in doubt, given up
 
 
 @dataclass(frozen=True)
@@ -87,6 +87,11 @@ class BeamSearch:
     def exhausted(self) -> bool:
         """Whether the beam has ended (no proof of anything)."""
         return not self._front
+
+    @property
+    def in_doubt(self) -> bool:
+        """Whether the goal has not come nearer for some cycles."""
+        return self._stalled >= DOUBTFUL
 
     def advance(self, expansions: int) -> list[Step] | None:
         """Drive the beam on over about `expansions` states; return the way to the goal when it has ended."""

@@ -88,6 +88,11 @@ class LatticeSearch:
         return None
 
     @property
+    def in_doubt(self) -> bool:
+        """Always: this search looks where a beam has failed."""
+        return True
+
+    @property
     def exhausted(self) -> bool:
         """Whether nothing is left to look at: no way at this resolution."""
         return not self._open
