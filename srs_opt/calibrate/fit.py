@@ -23,7 +23,7 @@ HOPELESS = 300.0  # deviance that even the linearisation promises to stay behind
 TRIED = 2  # iterations before that is believed
 TRUSTED = 0.25  # of the gain that slopes promise: with no larger error they serve for the next step too
 FAR_OFF = 3.0  # temper from which on a fit does not explain the data
-IDLE, SHORTEST = 2, 1e-3  # steps that gain nothing, and share of a step, at which a fit is given up
+IDLE, MOST_DAMPING = 2, 1e4  # steps that gain nothing, and damping, at which a fit is given up
 TAKEN_BACK = (0.5, 0.2, 0.0)  # parts of a step that a trial's scatter may go instead
 FEW_ASTRAY = 3  # where no more than a third of the trials went astray: else the step was too long
 JITTER = 2e-5  # deviance per measured value that a new mesh of the integration may cost
@@ -158,7 +158,7 @@ def fit(
     trials = experiment.trials if trials is None else trials
     grams = experiment.grams(point, coordinates, trials)
     at_start = misfit_ratio(grams)
-    done, idle, converged, length, behind = 0, 0, False, 1.0, math.inf
+    done, idle, converged, damping, behind = 0, 0, False, 0.0, math.inf
     while True:
         temper = temper_of(grams, correlated)
         now = objective(coordinates, grams, point, temper)
@@ -172,11 +172,11 @@ def fit(
                 break
             grams = experiment.grams(point, coordinates, trials)
             continue
-        if done >= iterations or idle >= IDLE or length < SHORTEST:
+        if done >= iterations or idle >= IDLE or damping > MOST_DAMPING:
             converged = missing < jitter and not stale
             break
         done += 1
-        moved, promised = _moved(point, coordinates, grams, temper, length)
+        moved, promised = _moved(point, coordinates, grams, temper, damping)
         try:
             new_grams = experiment.grams(moved, coordinates, trials, stale=True)
             moved = _tamed(experiment, coordinates, trials, (point, grams), (moved, new_grams), temper)
@@ -184,15 +184,15 @@ def fit(
         except NoAnswerError:
             gain = -math.inf
         if gain > -jitter:
-            idle = idle + 1 if gain < CONVERGED and not stale else 0
+            idle = idle + 1 if gain < CONVERGED and damping < 1 and not stale else 0
             point, grams = moved, new_grams
-            length = min(4 * length, 1.0)
+            damping = 0.0 if damping < 0.02 else damping * 0.3
             if abs(gain - promised) > TRUSTED * promised:
                 grams = experiment.grams(point, coordinates, trials)
         elif stale:
             grams = experiment.grams(point, coordinates, trials)
         else:
-            length *= 0.25
+            damping = max(damping * 4, 0.1)
         excess = within_reach(coordinates, grams, point) - beat
         if done >= TRIED and excess > HOPELESS and excess > 0.5 * behind:
             break
@@ -243,12 +243,16 @@ def _step(
     grams: Mapping[str, TrialGram],
     point: Point,
     temper: float,
+    damping: float = 0.0,
 ) -> Solution:
     """Solve for the step, holding coordinates that would leave their bounds at the bound."""
     precision, offset = priors(coordinates, point)
     now = np.array([point.values[c.name] for c in coordinates])
     lower = np.array([c.lower for c in coordinates])
     total = sum_eliminated(grams, temper)
+    if damping:
+        own = np.arange(len(coordinates))
+        total[own, own] += damping * (total[own, own] + precision)
     return bounded_solve(total, range(len(coordinates)), precision, offset, lower - now)
 
 
@@ -257,14 +261,10 @@ def _moved(
     coordinates: tuple[Coordinate, ...],
     grams: Mapping[str, TrialGram],
     temper: float,
-    length: float,
+    damping: float,
 ) -> tuple[Point, float]:
-    """Return the point after a part of the step within reason, and the deviance that it promises to gain.
-
-    The trials' scatter goes the same part of its way: a trial near a change of its gait follows its scatter
-    far less linearly than all trials follow the shared coordinates.
-    """
-    step = _step(coordinates, grams, point, temper).step
+    """Return the point after a step within reason, and the deviance that it promises to gain."""
+    step = _step(coordinates, grams, point, temper, damping).step
     for k, c in enumerate(coordinates):
         if not c.effect or "log_" in c.name:
             step[k] = np.clip(step[k], -LONGEST_LOG_STEP, LONGEST_LOG_STEP)
@@ -274,16 +274,15 @@ def _moved(
         back = parts[name].back
         now = scatter.get(name, np.zeros(back.shape[0]))
         limit = 5 * gram.scatter_sd
-        goal = np.clip(now + back[:, -1] - back[:, :-1] @ step, -limit, limit)
-        scatter[name] = now + length * (goal - now)
+        scatter[name] = np.clip(now + back[:, -1] - back[:, :-1] @ step, -limit, limit)
     precision, offset = priors(coordinates, point)
     both = np.append(step, -1.0)
     gain = sum(e.at_point - float(both @ e.matrix @ both) for e in parts.values())
     gain += float(precision @ (offset**2 - (offset + step) ** 2))
     values = dict(point.values)
     for coordinate, s in zip(coordinates, step):
-        values[coordinate.name] += length * float(s)
-    return Point(values, scatter), gain * length * (2 - length)
+        values[coordinate.name] += float(s)
+    return Point(values, scatter), gain
 
 
 def _tamed(

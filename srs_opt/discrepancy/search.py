@@ -18,7 +18,7 @@ from srs_opt.discrepancy.split import brief_name
 from srs_opt.errors import NoAnswerError
 from srs_opt.measurement.records import Trial
 
-NULL_ITERATIONS = 15
+NULL_ITERATIONS, POLISH = 12, 40
 DEEPEST, ROUNDS = 4, 6  # effects at once; additions or exchanges in all
 ADEQUATE = 0.01  # level at which a fitted model is rejected
 # Friction's smoothing is numerical, and its shape is nobody's physics: long data see the difference. What is
@@ -221,11 +221,18 @@ class Search:
             better = self._swapped(current, better)
             if better is None or not self._worth(better, current.hypothesis):
                 break
-            before, current = current, self._pruned(self.examine(better))
+            before, current = current, self._pruned(self.examine(self._polished(better)))
             again = current.hypothesis.label == before.hypothesis.label
             if again or self._settled(null, current) or _stuck(before.hypothesis, current.hypothesis):
                 break
         return current, self.fitted
+
+    def _polished(self, hypothesis: Hypothesis) -> Hypothesis:
+        """Return a hypothesis that explains the data with its fit carried on, where that had not ended."""
+        fit = hypothesis.fit
+        if fit.converged or fit.temper > FAR_OFF:
+            return hypothesis
+        return self.fit(hypothesis.candidates, fit.point, POLISH) or hypothesis
 
     def _settled(self, null: Examined, current: Examined) -> bool:
         """Whether there is nothing left to look for.
