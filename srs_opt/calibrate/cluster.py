@@ -7,7 +7,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from srs_opt.calibrate.coordinates import Coordinate
-from srs_opt.calibrate.experiment import Experiment, Extra, Point
+from srs_opt.calibrate.experiment import Experiment, Extra, Point, Slopes
 from srs_opt.calibrate.gram import TrialGram
 from srs_opt.calibrate.model import Model
 from srs_opt.calibrate.nominal import Meshes
@@ -20,14 +20,15 @@ if TYPE_CHECKING:
     from distributed import Client
 
 SHARE = 4  # trials of one task, simulated side by side
-Setup = tuple[Robot, str, float, float]
+Setup = tuple[Robot, str, float, float, bool]
+Memory = tuple[Meshes, Slopes | None]
 
 
 class ClusterCrew:
     """Has a cluster linearise an experiment's trials; a context manager.
 
-    A task carries all that it depends on, the trials' last meshes included, so that it can be done again
-    elsewhere.
+    A task carries all that it depends on, the trials' last meshes and slopes included, so that it can be done
+    again elsewhere.
 
     Parameters
     ----------
@@ -39,7 +40,8 @@ class ClusterCrew:
     def __init__(self, experiment: Experiment, address: str) -> None:
         self.experiment = experiment
         model = experiment.model
-        self._setup: Setup = (model.robot, model.full.model, experiment.sd_m, experiment.tolerance_m_s)
+        noise = (experiment.sd_m, experiment.tolerance_m_s, experiment.keeps)
+        self._setup: Setup = (model.robot, model.full.model, *noise)
         self._client: Client = connect(address)
 
     def __enter__(self) -> ClusterCrew:
@@ -51,7 +53,12 @@ class ClusterCrew:
         self._client.close()
 
     def grams(
-        self, trials: Sequence[Trial], point: Point, coordinates: Sequence[Coordinate], extra: Extra | None
+        self,
+        trials: Sequence[Trial],
+        point: Point,
+        coordinates: Sequence[Coordinate],
+        extra: Extra | None,
+        stale: bool = False,
     ) -> dict[str, TrialGram]:
         """Return the Gram matrices of `trials`.
 
@@ -60,17 +67,19 @@ class ClusterCrew:
         NoAnswerError
             If a trial cannot be simulated at `point`.
         """
-        runs = self.experiment.runs
+        runs, slopes = self.experiment.runs, self.experiment.slopes
         tasks = []
         for share in chunks(trials, SHARE):
-            meshes = {t.name: runs[t.name].meshes for t in share}
-            asked = (self._setup, tuple(share), meshes, point, tuple(coordinates), extra)
+            memory = {t.name: (runs[t.name].meshes, slopes.get(t.name) if stale else None) for t in share}
+            asked = (self._setup, tuple(share), memory, point, tuple(coordinates), extra)
             tasks.append(self._client.submit(_linearise, *asked, pure=False))
         found: dict[str, TrialGram] = {}
         failure: str | None = None
-        for grams, meshes in self._client.gather(tasks):
-            for name, known in meshes.items():
-                runs[name].meshes = known
+        for grams, memory in self._client.gather(tasks):
+            for name, (meshes, own) in memory.items():
+                runs[name].meshes = meshes
+                if own is not None:
+                    slopes[name] = own
             if isinstance(grams, str):
                 failure = grams
             else:
@@ -83,22 +92,30 @@ class ClusterCrew:
 def _linearise(
     setup: Setup,
     trials: tuple[Trial, ...],
-    meshes: Mapping[str, Meshes],
+    memory: Mapping[str, Memory],
     point: Point,
     coordinates: tuple[Coordinate, ...],
     extra: Extra | None,
-) -> tuple[dict[str, TrialGram] | str, dict[str, Meshes]]:
-    """Return the Gram matrices, or why there are none, and the meshes to go on with; runs on a worker."""
-    robot, model, sd_m, tolerance_m_s = setup
-    experiment = Experiment(_model(robot, model), trials, sd_m, tolerance_m_s=tolerance_m_s)
+) -> tuple[dict[str, TrialGram] | str, dict[str, Memory]]:
+    """Return the Gram matrices, or why there are none, and what to go on with; runs on a worker.
+
+    Where the task carries slopes they are used, and not sent back.
+    """
+    robot, model, sd_m, tolerance_m_s, keeps = setup
+    experiment = Experiment(_model(robot, model), trials, sd_m, tolerance_m_s=tolerance_m_s, keeps=keeps)
+    stale = False
     for t in trials:
-        experiment.runs[t.name].meshes = dict(meshes[t.name])
+        meshes, slopes = memory[t.name]
+        experiment.runs[t.name].meshes = dict(meshes)
+        if slopes is not None:
+            experiment.slopes[t.name], stale = slopes, True
     grams: dict[str, TrialGram] | str
     try:
-        grams = experiment.own_grams(trials, point, coordinates, extra)
+        grams = experiment.own_grams(trials, point, coordinates, extra, stale)
     except NoAnswerError as error:
         grams = str(error)
-    return grams, {t.name: experiment.runs[t.name].meshes for t in trials}
+    back = {} if stale else experiment.slopes
+    return grams, {t.name: (experiment.runs[t.name].meshes, back.get(t.name)) for t in trials}
 
 
 @lru_cache(maxsize=4)

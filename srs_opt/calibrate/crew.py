@@ -51,7 +51,7 @@ class Crew:
         for share in shares[1:]:
             if share:
                 here, there = context.Pipe()
-                noise = (experiment.sd_m, experiment.tolerance_m_s)
+                noise = (experiment.sd_m, experiment.tolerance_m_s, experiment.keeps)
                 setup = (experiment.model.robot, experiment.model.full.model, share, *noise)
                 process = context.Process(target=_serve, args=(there, *setup), daemon=True)
                 with workers_deaf_to_interrupts():
@@ -76,7 +76,12 @@ class Crew:
             connection.close()
 
     def grams(
-        self, trials: Sequence[Trial], point: Point, coordinates: Sequence[Coordinate], extra: Extra | None
+        self,
+        trials: Sequence[Trial],
+        point: Point,
+        coordinates: Sequence[Coordinate],
+        extra: Extra | None,
+        stale: bool = False,
     ) -> dict[str, TrialGram]:
         """Return the Gram matrices of `trials`, every process working on its share.
 
@@ -89,13 +94,13 @@ class Crew:
         for _, connection, share in self._members:
             names = [t.name for t in trials if t.name in share]
             if names:
-                connection.send((names, point, tuple(coordinates), extra))
+                connection.send((names, point, tuple(coordinates), extra, stale))
                 asked.append(connection)
         found: dict[str, TrialGram] = {}
         failure: NoAnswerError | None = None
         try:
             own = [t for t in trials if t.name in self.own]
-            found.update(self.experiment.own_grams(own, point, coordinates, extra))
+            found.update(self.experiment.own_grams(own, point, coordinates, extra, stale))
         except NoAnswerError as error:
             failure = error
         for connection in asked:
@@ -110,20 +115,27 @@ class Crew:
 
 
 def _serve(
-    connection: Connection, robot: Any, model: str, trials: list[Trial], sd_m: float, tolerance_m_s: float
+    connection: Connection,
+    robot: Any,
+    model: str,
+    trials: list[Trial],
+    sd_m: float,
+    tolerance_m_s: float,
+    keeps: bool,
 ) -> None:
     """Answer requests until told to stop."""
     from srs_opt.calibrate.fit import Experiment
     from srs_opt.calibrate.model import Model
 
-    experiment = Experiment(Model(robot, model), trials, sd_m, tolerance_m_s=tolerance_m_s)
+    experiment = Experiment(Model(robot, model), trials, sd_m, tolerance_m_s=tolerance_m_s, keeps=keeps)
     known = {t.name: t for t in trials}
     # a parent that has gone, between two requests or in the middle of one, is no failure of this process
     with contextlib.suppress(EOFError, OSError, KeyboardInterrupt):
         while (request := connection.recv()) is not None:
-            names, point, coordinates, extra = request
+            names, point, coordinates, extra, stale = request
             try:
-                answer: object = experiment.own_grams([known[n] for n in names], point, coordinates, extra)
+                share = [known[n] for n in names]
+                answer: object = experiment.own_grams(share, point, coordinates, extra, stale)
             except NoAnswerError as error:
                 answer = str(error)
             connection.send(answer)

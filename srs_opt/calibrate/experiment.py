@@ -25,7 +25,9 @@ if TYPE_CHECKING:
     from srs_opt.calibrate.crew import Crew
 
 AT_ONCE = 48  # trials whose motions are in memory together: enough to fill the lanes
+MOST_KEPT = 2_000_000  # measured values up to which slopes and motions are kept: some 300 MB
 Extra = Callable[[Trial, Prediction], np.ndarray]
+Slopes = tuple[tuple[str, ...], np.ndarray]  # coordinates, and a trial's slopes (n, K) in single precision
 
 
 @dataclass(frozen=True)
@@ -64,6 +66,8 @@ class Experiment:
         Readings of other instruments to hold the model against too.
     tolerance_m_s : float, optional
         Of the simulation; default: what the trials' number of values asks for.
+    keeps : bool, optional
+        Whether slopes and motions are kept for the next request; default: while they fit into memory.
     """
 
     def __init__(
@@ -73,6 +77,7 @@ class Experiment:
         sd_m: float,
         bench: Bench | None = None,
         tolerance_m_s: float | None = None,
+        keeps: bool | None = None,
     ) -> None:
         self.model, self.trials, self.sd_m = model, tuple(trials), sd_m
         self.readings = readings(model, bench) if bench is not None else ()
@@ -80,6 +85,9 @@ class Experiment:
         self.tracks = {t.name: track_of(t) for t in self.trials}
         count = sum(track.size for track in self.tracks.values() if track is not None)
         self.tolerance_m_s = tolerance_m_s or tolerance_for(count, sd_m)
+        self.keeps = count <= MOST_KEPT if keeps is None else keeps
+        self.slopes: dict[str, Slopes] = {}
+        self._motions: dict[str, tuple[dict[str, float], Nodes]] = {}
         self.scatter_sd = np.array(list(SCATTER_SD.values()))
         self.crew: Crew | ClusterCrew | None = None
 
@@ -126,17 +134,29 @@ class Experiment:
         point: Point,
         coordinates: Sequence[Coordinate],
         extra: Extra | None = None,
+        stale: bool = False,
     ) -> dict[str, TrialGram]:
         """Return the Gram matrices of `trials`, simulated side by side in this process."""
         found = {}
         for first in range(0, len(trials), AT_ONCE):
             some = trials[first : first + AT_ONCE]
-            searches = [self.runs[t.name].search(point.of_trial(t.name), self.tolerance_m_s) for t in some]
-            for trial, nodes in zip(some, together(searches)):
-                if isinstance(nodes, NoAnswerError):
-                    raise nodes
-                found[trial.name] = self._gram(trial, nodes, point, coordinates, extra)
+            for trial, nodes in zip(some, self._simulated(some, point)):
+                found[trial.name] = self._gram(trial, nodes, point, coordinates, extra, stale)
         return found
+
+    def _simulated(self, trials: Sequence[Trial], point: Point) -> list[Nodes]:
+        """Return the trials' motions at `point`; one that was simulated there last is not simulated anew."""
+        wanted = {t.name: {k: v for k, v in point.of_trial(t.name).items() if v != 0} for t in trials}
+        known = {n: self._motions[n][1] for n, v in wanted.items() if self._motions.get(n, ({},))[0] == v}
+        names = [n for n in wanted if n not in known]
+        searches = [self.runs[n].search(point.of_trial(n), self.tolerance_m_s) for n in names]
+        for name, nodes in zip(names, together(searches)):
+            if isinstance(nodes, NoAnswerError):
+                raise nodes
+            known[name] = nodes
+            if self.keeps:
+                self._motions[name] = wanted[name], nodes
+        return [known[n] for n in wanted]
 
     def _gram(
         self,
@@ -145,17 +165,26 @@ class Experiment:
         point: Point,
         coordinates: Sequence[Coordinate],
         extra: Extra | None,
+        stale: bool,
     ) -> TrialGram:
-        prediction = self._seen(trial, nodes, point, coordinates)
+        names = tuple(c.name for c in coordinates)
+        kept = self.slopes.get(trial.name)
+        stale = stale and kept is not None and kept[0] == names
+        prediction = self._seen(trial, nodes, point, () if stale else coordinates)
         residual = self.residual(trial, prediction)
-        slopes = prediction.slopes.reshape(residual.size, -1)
+        if stale:
+            assert kept is not None
+            slopes = kept[1]
+        else:
+            slopes = prediction.slopes.reshape(residual.size, -1)
+            if self.keeps and extra is None:
+                self.slopes[trial.name] = names, slopes.astype(np.float32)
         if extra is not None:
             slopes = np.column_stack([slopes, extra(trial, prediction).reshape(residual.size, -1)])
-        names = [c.name for c in coordinates]
         scattered = [names.index(n) for n in SCATTER_SD]
         now = point.scatter.get(trial.name, np.zeros(len(SCATTER_SD)))
         gram = trial_gram(residual.ravel(), slopes, self.sd_m, scattered, self.scatter_sd, now)
-        return replace(gram, serial=serial_correlation(residual / self.sd_m))
+        return replace(gram, serial=serial_correlation(residual / self.sd_m), stale=stale)
 
     def grams(
         self,
@@ -163,13 +192,20 @@ class Experiment:
         coordinates: Sequence[Coordinate],
         trials: Sequence[Trial] | None = None,
         extra: Extra | None = None,
+        *,
+        stale: bool = False,
     ) -> dict[str, TrialGram]:
-        """Return the Gram matrices of several trials."""
+        """Return the Gram matrices of several trials.
+
+        With `stale` the slopes may be those of the last request for the same coordinates, which costs a
+        third; the residuals are always those at `point`.
+        """
         chosen = self.trials if trials is None else trials
+        stale = stale and self.keeps and extra is None
         if self.crew is not None:
-            found = self.crew.grams(chosen, point, coordinates, extra)
+            found = self.crew.grams(chosen, point, coordinates, extra, stale)
         else:
-            found = self.own_grams(chosen, point, coordinates, extra)
+            found = self.own_grams(chosen, point, coordinates, extra, stale)
         if self.readings and found:
             further = next(iter(found.values())).raw.shape[0] - 1 - len(coordinates)
             found[NAME] = reading_gram(self.readings, point.values, coordinates, further)

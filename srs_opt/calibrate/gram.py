@@ -29,6 +29,8 @@ class TrialGram:
         Prior of the scatter, and where it stood at the linearisation.
     serial : float
         Standardised sum of products of residuals a few frames apart (about unit normal for pure noise).
+    stale : bool
+        Whether the slopes are those of an earlier point.
     """
 
     raw: np.ndarray
@@ -37,6 +39,7 @@ class TrialGram:
     scatter_sd: np.ndarray
     scatter_now: np.ndarray
     serial: float = 0.0
+    stale: bool = False
 
     @property
     def misfit(self) -> float:

@@ -62,6 +62,7 @@ class Maps:
     def __init__(self, dataset: DataSet, model: str, base: Sequence[Coordinate]) -> None:
         self.robot, self.model = dataset.robot, model
         self.rows = dict(enumerate(dataset.maps))
+        self.trials: tuple[Trial, ...] = ()
         bench = self._paths(start_point(base), base)
         if not bench:
             raise NoAnswerError("no gait of the maps has a steady state with this robot")
@@ -73,9 +74,14 @@ class Maps:
         self._whitening = {k: np.linalg.inv(_root(row, spread[k], own)) for k, row in self.rows.items()}
 
     def grams(
-        self, point: Point, coordinates: Sequence[Coordinate], trials: Sequence[Trial] | None = None
+        self,
+        point: Point,
+        coordinates: Sequence[Coordinate],
+        trials: Sequence[Trial] | None = None,
+        *,
+        stale: bool = False,
     ) -> dict[str, TrialGram]:
-        """Return the normal equations of every row.
+        """Return the normal equations of every row, the slopes always fresh.
 
         Raises
         ------

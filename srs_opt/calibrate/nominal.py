@@ -171,6 +171,8 @@ def _fitted(
         return None
     mesh = kept[1]
     stretch = duration_s / np.bincount(mesh.phase, mesh.h_s, minlength=count)
+    if np.abs(stretch - 1).max() < 1e-12:  # the same motion again is the same to the last bit
+        return mesh
     return Mesh(mesh.h_s * stretch[mesh.phase], mesh.phase)
 
 

@@ -92,7 +92,9 @@ def fit_hypothesis(
     trials: Sequence[Trial],
     iterations: int = ITERATIONS,
     beat: float = math.inf,
+    near: float = 0.0,
 ) -> Hypothesis:
-    """Fit the base coordinates together with the effects of `candidates`."""
+    """Fit the base coordinates together with the effects of `candidates`; `near` as for `fit`."""
     coordinates = (*base, *(c for k in candidates for c in k.coordinates))
-    return Hypothesis(tuple(candidates), fit(experiment, coordinates, start, trials, iterations, beat=beat))
+    found = fit(experiment, coordinates, start, trials, iterations, beat=beat, near=near)
+    return Hypothesis(tuple(candidates), found)

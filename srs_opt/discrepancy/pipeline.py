@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from srs_opt.calibrate.coordinates import Candidate, all_candidates, base_coordinates
 from srs_opt.calibrate.crew import helped
-from srs_opt.calibrate.fit import Experiment, start_point
+from srs_opt.calibrate.fit import FAR_OFF, Experiment
 from srs_opt.calibrate.model import Model
 from srs_opt.calibrate.noise import noise_sd_m
 from srs_opt.discrepancy.design import NextExperiment, next_experiment, rivals_of
@@ -18,11 +18,9 @@ from srs_opt.discrepancy.screen import Score
 from srs_opt.discrepancy.seal import Gap, open_seal
 from srs_opt.discrepancy.search import Examined, Search
 from srs_opt.discrepancy.select import Selection, select
-from srs_opt.discrepancy.split import LEAST_OPEN, Split, split_trials
+from srs_opt.discrepancy.split import LEAST_OPEN, Split, few_and_brief, split_trials
 from srs_opt.discrepancy.verdict import DETECTED, NO_GAP, NOT_TESTABLE, ONE_OF, UNKNOWN, Verdict, judge
 from srs_opt.measurement.records import DataSet
-
-NULL_ITERATIONS = 10
 
 
 @dataclass(frozen=True)
@@ -96,35 +94,36 @@ def find_discrepancy(
     sd = noise_sd_m(dataset)
     if not split.enough:
         return _not_testable(dataset, split, sd, started)
-    experiment = Experiment(Model(dataset.robot, model), (*split.open, *split.sealed), sd, dataset.bench)
+    quick = few_and_brief(split.open, seed)
+    trials = (*split.open, *split.sealed, *quick)
+    experiment = Experiment(Model(dataset.robot, model), trials, sd, dataset.bench)
+    candidates = _candidates(dataset, effects)
+    search = Search(experiment, base_coordinates(dataset.robot), candidates, split.open, seed, tell, quick)
     with helped(experiment, jobs, cluster):
-        return _examine(dataset, experiment, split, _candidates(dataset, effects), seed, tell, started)
+        return _examine(dataset, search, split, tell, started)
 
 
 def _examine(
     dataset: DataSet,
-    experiment: Experiment,
+    search: Search,
     split: Split,
-    candidates: tuple[Candidate, ...],
-    seed: int,
     tell: Callable[[str], None],
     started: float,
 ) -> Discrepancy:
-    base = base_coordinates(dataset.robot)
-    search = Search(experiment, base, candidates, split.open, seed, tell)
+    experiment = search.experiment
     tell(f"calibrating on {len(split.open)} trials")
-    first = search.fit((), start_point(base), NULL_ITERATIONS)
+    first = search.calibrate()
     if first is None:
         why = "the robot as documented cannot be simulated under these trials' conditions"
         return _not_testable(dataset, split, experiment.sd_m, started, why)
-    tell(f"screening {len(candidates)} candidates")
+    tell(f"screening {len(search.candidates)} candidates")
     null = search.examine(first)
     at_odds = contradicting(search, null) if null.detection.p_value < DETECTED else ()
     searched = null.detection.p_value < DETECTED and not at_odds
     best, fitted = search.run(null) if searched else (null, [first])
     selection = select(best.hypothesis, fitted, split)
     tell("opening the sealed trials")
-    gap = open_seal(experiment, first.fit, best.hypothesis.fit, split.sealed, seed)
+    gap = open_seal(experiment, first.fit, best.hypothesis.fit, split.sealed, search.seed)
     verdict = judge(null, best, selection, gap, at_odds)
     following = None
     if verdict.word in (ONE_OF, UNKNOWN) and not at_odds:
@@ -150,16 +149,21 @@ def _examine(
 
 def contradicting(search: Search, null: Examined) -> tuple[str, ...]:
     """Return the few trials, if any, without which calibration alone explains all the others."""
-    odd = odd_trials(null)
-    for count in range(1, len(odd) + 1):
-        rest = [t for t in search.trials if t.name not in odd[:count]]
-        if len(rest) < LEAST_OPEN:
-            break
-        without = Search(search.experiment, search.base, search.candidates, rest, search.seed)
-        found = without.fit((), null.hypothesis.fit.point, NULL_ITERATIONS)
-        if found is not None and without.examine(found).detection.p_value >= DETECTED:
-            return odd[:count]
-    return ()
+    odd = odd_trials(null)[: len(search.trials) - LEAST_OPEN]
+    # most sets end here: what stays without all of them is not mended by leaving out fewer
+    if not odd or not _explained_without(search, null, odd):
+        return ()
+    counts = range(1, len(odd))
+    return next((odd[:k] for k in counts if _explained_without(search, null, odd[:k])), odd)
+
+
+def _explained_without(search: Search, null: Examined, odd: Sequence[str]) -> bool:
+    """Whether calibration alone explains the trials other than `odd`."""
+    without = search.without(odd)
+    found = without.calibrate(null.hypothesis.fit.point, FAR_OFF)
+    if found is None or found.fit.temper > FAR_OFF:
+        return False
+    return without.examine(found).detection.p_value >= DETECTED
 
 
 def _candidates(dataset: DataSet, effects: Sequence[str] | None) -> tuple[Candidate, ...]:

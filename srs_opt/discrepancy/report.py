@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
 from srs_opt.discrepancy.pictures import pictures
 from srs_opt.discrepancy.pipeline import Discrepancy
+from srs_opt.discrepancy.search import Examined
 from srs_opt.discrepancy.verdict import NAMED, NO_GAP, NOT_TESTABLE, ONE_OF, UNKNOWN
 from srs_opt.files import write_text
 
@@ -55,8 +57,6 @@ def write_report(found: Discrepancy, record: dict[str, Any], path: Path) -> Path
 
 def _parameters(found: Discrepancy) -> list[dict[str, Any]]:
     """Return bench and calibrated values of the robot, with what the verdict's effects change."""
-    import math
-
     if found.null is None or found.selection is None:
         return []
     rows = []
@@ -92,6 +92,16 @@ def _tests(found: Discrepancy) -> list[dict[str, Any]]:
     return rows
 
 
+def how_much_is_left(examined: Examined) -> str:
+    """Return in words how far a fit's misfit lies above the noise, and within what that is known."""
+    fit = examined.hypothesis.fit
+    left = fit.misfit_ratio - 1
+    within = math.sqrt(2 / sum(g.count for g in fit.grams.values()))  # standard deviation of a variance
+    if left <= 0:
+        return f"in size nothing beyond the noise, whose variance is known within {within:.1%}"
+    return f"{left:.1%} (± {within:.1%}) of the noise's variance"
+
+
 def caveats(found: Discrepancy) -> list[str]:
     """Return what a reader should know before acting."""
     notes = []
@@ -105,10 +115,10 @@ def caveats(found: Discrepancy) -> list[str]:
     if found.gap is not None and found.gap.trials < 5:
         notes.append(f"Only {found.gap.trials} trials were sealed: the interval of the gap is wide.")
     if found.best is not None and found.verdict.word in (NAMED, ONE_OF) and not found.best.adequate:
-        left, p = found.best.hypothesis.fit.misfit_ratio - 1, found.best.detection.p_value
         notes.append(
-            f"Something is left (p = {p:.2g}), {left:.1%} of the noise's variance: as little as the "
-            "numerical smoothing of friction can leave, so that it does not count against the name."
+            f"Something is left (p = {found.best.detection.p_value:.2g}), {how_much_is_left(found.best)}: "
+            "as little as the numerical smoothing of friction can leave, so that it does not count against "
+            "the name."
         )
     if found.gap is not None and found.gap.ratio is None and found.verdict.word in (NAMED, ONE_OF):
         notes.append(

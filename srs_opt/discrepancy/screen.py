@@ -42,6 +42,11 @@ class Score:
         """Number of sizes."""
         return len(self.candidate.sizes)
 
+    @property
+    def relative_size(self) -> float:
+        """Expected size over the typical one."""
+        return float(np.linalg.norm([s / c.typical for s, c in zip(self.step, self.candidate.sizes)]))
+
 
 @dataclass(frozen=True)
 class Linearisation:

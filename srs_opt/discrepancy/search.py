@@ -9,20 +9,23 @@ from dataclasses import dataclass
 import numpy as np
 
 from srs_opt.calibrate.coordinates import Candidate, Coordinate
-from srs_opt.calibrate.fit import Experiment, Fit, Point, priors, sum_eliminated
+from srs_opt.calibrate.fit import FAR_OFF, Experiment, Fit, Point, priors, start_point, sum_eliminated
 from srs_opt.discrepancy.detect import Detection, detect, project
 from srs_opt.discrepancy.functions import Group, ResidualFunctions
 from srs_opt.discrepancy.hypothesis import ITERATIONS, SMALL, Hypothesis, fit_hypothesis
 from srs_opt.discrepancy.screen import Linearisation, Score, expected_start, screen
-from srs_opt.discrepancy.split import spread
+from srs_opt.discrepancy.split import brief_name
 from srs_opt.errors import NoAnswerError
 from srs_opt.measurement.records import Trial
 
+NULL_ITERATIONS, POLISH = 12, 40
 DEEPEST, ROUNDS = 4, 6  # effects at once; additions or exchanges in all
 ADEQUATE = 0.01  # level at which a fitted model is rejected
 # Friction's smoothing is numerical, and its shape is nobody's physics: long data see the difference. What is
-# left of a gap is put down to it while it is this share of the noise's variance and of the gap's.
-OF_NOISE, OF_GAP = 0.02, 0.002
+# left of a gap is put down to it while it is this share of the noise's variance and of the gap's, and asks
+# for nothing known at a size that matters: gaits near a change of theirs show a thousandth of a wheel's toe.
+OF_NOISE, OF_GAP = 0.02, 0.005
+TELLING = 0.1  # of an effect's typical size
 FALSE_NAME = 0.002  # family-wise level for adding an effect
 # Deviance within which two sets of effects cannot be told apart. The truth falls behind a rival by D with
 # probability Phi(-sqrt(D)) at worst, whatever separates the two: under 1 % here, so that the sets that are
@@ -31,7 +34,9 @@ RIVAL = 6.0
 _CONTENDER = 0.45  # share of the best expected gain that earns a refit
 _NEAR = 40.0  # or this little behind it
 _MOST_REFITS = (5, 4, 3, 3)
-QUICK, QUICK_ITERATIONS = 9, 8  # trials and iterations that refits are tried with before all are asked
+QUICK_ITERATIONS = 10  # with the first seconds of a few trials, before all are asked
+# shares of the misfit that fits which do not explain the data may leave to be gained: those, and all others
+ROUGHLY, NEARLY = 0.01, 0.001
 LEFT = 0.6  # share of the misfit that a second or later effect may leave and still count as progress
 FIRM = 10.0  # standard deviations from zero at which an effect is not superfluous, without a refit
 
@@ -87,6 +92,8 @@ class Search:
     candidates : sequence of Candidate
     trials : sequence of Trial
         The open ones.
+    quick : sequence of Trial
+        What a refit is tried with before all trials are asked; nothing: all at once.
     """
 
     def __init__(
@@ -97,27 +104,32 @@ class Search:
         trials: Sequence[Trial],
         seed: int = 0,
         report: Report | None = None,
+        quick: Sequence[Trial] = (),
     ) -> None:
         self.experiment, self.base = experiment, tuple(base)
         self.candidates, self.trials = tuple(candidates), tuple(trials)
         self.functions = ResidualFunctions.of(self.trials)
         self.seed = seed
         self._report = report or (lambda message: None)
-        self.quick = self.trials
-        if len(self.trials) > QUICK:
-            few = spread(self.trials, QUICK, np.random.default_rng([seed, 29]))
-            self.quick = tuple(t for t in self.trials if t in few)
-        self._fits: dict[tuple[frozenset[str], int], Hypothesis] = {}
+        self.quick = tuple(quick) or self.trials
+        self._fits: dict[tuple[frozenset[str], bool], Hypothesis] = {}
 
     @property
     def fitted(self) -> list[Hypothesis]:
         """Return what was fitted to all open trials."""
-        return [h for (_, count), h in self._fits.items() if count == len(self.trials)]
+        return [h for (_, quick), h in self._fits.items() if not quick]
 
     @property
     def tried(self) -> set[str]:
         """Labels of everything that was refitted, also to a part of the trials."""
         return {h.label for h in self._fits.values()}
+
+    def without(self, names: Sequence[str]) -> Search:
+        """Return a search of its own that some trials are kept from."""
+        rest = [t for t in self.trials if t.name not in names]
+        gone = {*names, *map(brief_name, names)}
+        quick = [t for t in self.quick if t.name not in gone]
+        return Search(self.experiment, self.base, self.candidates, rest, self.seed, quick=quick)
 
     def fit(
         self,
@@ -125,23 +137,48 @@ class Search:
         start: Point,
         iterations: int = ITERATIONS,
         beat: float = math.inf,
-        trials: Sequence[Trial] | None = None,
+        *,
+        quick: bool = False,
+        near: float = NEARLY,
     ) -> Hypothesis | None:
         """Fit a set of effects; None where the motion cannot be simulated."""
-        trials = self.trials if trials is None else trials
-        key = (frozenset(c.label for c in candidates), len(trials))
+        quick = quick and self.quick != self.trials
+        trials = self.quick if quick else self.trials
+        key = (frozenset(c.label for c in candidates), quick)
         known = self._fits.get(key)
         if known is not None and known.fit.converged:
             return known
         label = " + ".join(c.label for c in candidates)
-        self._report(f"refit on {len(trials)} trials: {label}" if label else "calibration alone")
+        on = f"the start of {len(trials)} trials" if quick else f"{len(trials)} trials"
+        self._report(f"refit on {on}: {label}" if label else "calibration alone")
         try:
-            found = fit_hypothesis(self.experiment, self.base, candidates, start, trials, iterations, beat)
+            found = fit_hypothesis(
+                self.experiment, self.base, candidates, start, trials, iterations, beat, near
+            )
         except NoAnswerError:
             return None
         if known is None or found.deviance < known.deviance:
             self._fits[key] = found
         return self._fits[key]
+
+    def try_out(
+        self, candidates: Sequence[Candidate], start: Point, beat: float = math.inf
+    ) -> Hypothesis | None:
+        """Fit a set of effects roughly, to the start of a few trials."""
+        return self.fit(candidates, start, QUICK_ITERATIONS, beat, quick=True, near=ROUGHLY)
+
+    def calibrate(self, start: Point | None = None, give_up: float = math.inf) -> Hypothesis | None:
+        """Fit the model without effects, first to the start of a few trials.
+
+        Where even there the noise must be taken for `give_up` times as large, that is the answer.
+        """
+        start = start_point(self.base) if start is None else start
+        first = self.try_out((), start)
+        if first is not None:
+            if first.fit.temper > give_up:
+                return first
+            start = first.fit.point
+        return self.fit((), start, NULL_ITERATIONS, near=ROUGHLY)
 
     def examine(self, hypothesis: Hypothesis) -> Examined:
         """Linearise about a fitted hypothesis, test what is left and screen what could explain it."""
@@ -184,10 +221,26 @@ class Search:
             better = self._swapped(current, better)
             if better is None or not self._worth(better, current.hypothesis):
                 break
-            before, current = current, self._pruned(self.examine(better))
-            if explained(null, current) or _stuck(before.hypothesis, current.hypothesis):
+            before, current = current, self._pruned(self.examine(self._polished(better)))
+            again = current.hypothesis.label == before.hypothesis.label
+            if again or self._settled(null, current) or _stuck(before.hypothesis, current.hypothesis):
                 break
         return current, self.fitted
+
+    def _polished(self, hypothesis: Hypothesis) -> Hypothesis:
+        """Return a hypothesis that explains the data with its fit carried on, where that had not ended."""
+        fit = hypothesis.fit
+        if fit.converged or fit.temper > FAR_OFF:
+            return hypothesis
+        return self.fit(hypothesis.candidates, fit.point, POLISH) or hypothesis
+
+    def _settled(self, null: Examined, current: Examined) -> bool:
+        """Whether there is nothing left to look for.
+
+        What friction's smoothing may have left does not count, unless the fit had to go far from physics or
+        the bench for it: two of three effects can come that near.
+        """
+        return current.adequate or (explained(null, current) and not current.hypothesis.implausible())
 
     def _swapped(self, current: Examined, added: Hypothesis | None) -> Hypothesis | None:
         """Return the better of `added` and the best exchange of one effect for another."""
@@ -200,11 +253,21 @@ class Search:
                 continue
             start = expected_start(lin, scores[0])
             rest = tuple(c for c in have if c is not dropped)
-            beat = current.hypothesis.deviance if best is None else best.deviance
-            swapped = self.fit((*rest, scores[0].candidate), start, beat=beat)
+            exchanged = (*rest, scores[0].candidate)
+            rival = current.hypothesis if best is None else best
+            limit = self._tried_out(rival) + 2 * RIVAL
+            tried = self.try_out(exchanged, start, limit)
+            if tried is None or _cost(tried) > limit:
+                continue
+            swapped = self.fit(exchanged, tried.fit.point, beat=rival.deviance)
             if swapped is not None and (best is None or _cost(swapped) < _cost(best)):
                 best = swapped
         return best
+
+    def _tried_out(self, hypothesis: Hypothesis) -> float:
+        """Return what the start of a few trials says against a hypothesis that was fitted to all."""
+        tried = self.try_out(hypothesis.candidates, hypothesis.fit.point)
+        return math.inf if tried is None else _cost(tried)
 
     def _proposals(self, current: Examined, depth: int) -> list[Score]:
         """Return the candidates that deserve a refit, best first."""
@@ -213,6 +276,8 @@ class Search:
             for s in current.scores
             if self.significant(s) or s.improvement * current.linearisation.temper > 60
         ]
+        if current.hypothesis.fit.temper < FAR_OFF:  # expected sizes can be believed
+            scores = [s for s in scores if s.relative_size >= TELLING]
         if not scores:
             return []
         best = scores[0].improvement
@@ -226,18 +291,16 @@ class Search:
         return chosen
 
     def _refit(self, current: Examined, proposals: list[Score], most: int) -> Hypothesis | None:
-        """Refit proposals on some of the trials, best first; return the best fit to all of them."""
+        """Refit proposals on the start of a few trials, best first; return the best fit to all of them."""
         found: list[Hypothesis] = []
         have = current.hypothesis.candidates
         for score in proposals[: 2 * most]:
             start = expected_start(current.linearisation, score)
             beat = min((h.deviance for h in found), default=math.inf)
-            hypothesis = self.fit(
-                (*have, score.candidate), start, QUICK_ITERATIONS, beat=beat, trials=self.quick
-            )
+            hypothesis = self.try_out((*have, score.candidate), start, beat)
             if hypothesis is not None:
                 found.append(hypothesis)
-            settled = found and min(h.fit.misfit_ratio for h in found) < 1.02
+            settled = found and min(h.fit.temper for h in found) == 1
             if len(found) >= most and (settled or len(found) >= 2 * most):
                 break
         if not found:
@@ -275,9 +338,17 @@ class Search:
 
 def explained(null: Examined, examined: Examined) -> bool:
     """Whether nothing is left of the gap, or no more than the smoothing of friction can leave."""
+    if examined.adequate:
+        return True
+    family = len(examined.scores)
+    if any(
+        s.relative_size >= TELLING and s.improvement > needed_gain(s.candidate, family)
+        for s in examined.scores
+    ):
+        return False
     left = examined.hypothesis.fit.misfit_ratio - 1
     gap = null.hypothesis.fit.misfit_ratio - 1
-    return examined.adequate or (left < OF_NOISE and left < OF_GAP * gap)
+    return left < OF_NOISE and left < OF_GAP * gap
 
 
 def _stuck(before: Hypothesis, after: Hypothesis) -> bool:

@@ -1,11 +1,11 @@
 import numpy as np
 
-from srs_opt.discrepancy.split import split_trials
+from srs_opt.discrepancy.split import BRIEF_S, FEW, few_and_brief, split_trials
 from srs_opt.measurement.records import Trial
 
 
-def trials(count):
-    time_s = np.arange(100) / 50
+def trials(count, frames=100):
+    time_s = np.arange(frames) / 50
     return [
         Trial(
             f"t{k}",
@@ -14,9 +14,9 @@ def trials(count):
             0.0,
             1.57,
             0.0,
-            2.0,
+            frames / 50,
             time_s,
-            np.zeros((100, 5, 2)),
+            np.zeros((frames, 5, 2)),
         )
         for k in range(count)
     ]
@@ -51,3 +51,12 @@ def test_a_trial_of_holes_is_left_out_with_a_reason():
 def test_too_few_trials_are_not_enough():
     assert not split_trials(trials(3)).enough
     assert not split_trials([]).enough
+
+
+def test_the_first_seconds_of_a_few_trials_have_names_of_their_own():
+    many = trials(12, 400)
+    some = few_and_brief(many)
+    assert len(some) == FEW
+    assert all(t.time_s[-1] <= BRIEF_S and t.markers_m.shape[0] == t.time_s.size for t in some)
+    assert not {t.name for t in some} & {t.name for t in many}
+    assert few_and_brief(trials(5)) == ()  # would save nothing
