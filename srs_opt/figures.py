@@ -12,6 +12,7 @@ from srs_opt.files import atomic_path
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
 
 # Okabe and Ito's palette: distinguishable with any colour vision
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#999999")
@@ -77,6 +78,13 @@ def save_figure(figure: Figure, stem: Path | str, *, dpi: int = 200) -> tuple[Pa
             metadata = {"Date": None} if target.suffix == ".svg" else None
             figure.savefig(temporary, dpi=dpi, metadata=metadata)
     return targets
+
+
+def line_key(label: str, **style: Any) -> Line2D:
+    """Return a legend's entry for a style that several lines share, such as one colour per pressure."""
+    from matplotlib.lines import Line2D
+
+    return Line2D([], [], **{"color": "black", **style}, label=label)
 
 
 def draw_body(axes: Axes, x: Any, y: Any, width_m: float, **style: Any) -> None:
