@@ -45,7 +45,7 @@ def draw(speed: dict[str, np.ndarray], error: np.ndarray, stem: Path) -> None:
     for panel, name in zip(panels[1, 1:], ("simplified model", MEASURED)):
         filled = panel.contourf(FREQUENCIES_HZ, PRESSURES_KPA, per_cent[name], levels, cmap="RdBu_r")
         panel.set(
-            title=f"{name.split()[0]} over complex − 1", xlabel="frequency (Hz)", ylabel="pressure (kPa)"
+            xlabel="frequency (Hz)", ylabel="pressure (kPa)", title=f"{name.split()[0]} over complex − 1"
         )
     figure.colorbar(filled, ax=panels[1], label="difference (%)")
     cut = panels[1, 0]
