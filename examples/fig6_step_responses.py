@@ -54,7 +54,7 @@ def main(out: Path = Path("out/examples")) -> float:
     for condition in ("lifted", "ground"):
         slope, tau = bench.slope(condition), bench.constants(condition)
         print(
-            f"{condition:7s} C0/p = {slope.value:.3f} ± {slope.sd:.3f} 1/m per kPa, "
+            f"{condition:7s} C0/p = {slope.value:.3f} +- {slope.sd:.3f} 1/m per kPa, "
             f"tau = {tau.tau1_s:.3f} and {tau.tau2_s:.3f} s"
         )
     return bench.slope("lifted").value / bench.slope("ground").value
