@@ -44,9 +44,8 @@ def draw(speed: dict[str, np.ndarray], error: np.ndarray, stem: Path) -> None:
     levels = np.linspace(-8, 8, 17)
     for panel, name in zip(panels[1, 1:], ("simplified model", MEASURED)):
         filled = panel.contourf(FREQUENCIES_HZ, PRESSURES_KPA, per_cent[name], levels, cmap="RdBu_r")
-        panel.set(
-            xlabel="frequency (Hz)", ylabel="pressure (kPa)", title=f"{name.split()[0]} over complex − 1"
-        )
+        panel.set(xlabel="frequency (Hz)", ylabel="pressure (kPa)")
+        panel.set_title(f"{name.split()[0]} over complex − 1")
     figure.colorbar(filled, ax=panels[1], label="difference (%)")
     cut = panels[1, 0]
     for row, colour in ((0, COLOURS[0]), (-1, COLOURS[1])):
