@@ -65,6 +65,7 @@ def _contours(axes: Axes, part: GaitMap, values: np.ndarray, label: str) -> None
     axes.set_xlabel("frequency (Hz)")
     axes.set_ylabel("pressure (kPa)")
     filled = axes.contourf(frequency, pressure, table, 12, cmap=SEQUENTIAL)
-    lines = axes.contour(frequency, pressure, table, filled.levels[::2], colors="white", linewidths=0.5)
-    bar = axes.figure.colorbar(filled, ax=axes, label=label, ticks=filled.levels[::2])
+    shown = np.asarray(filled.levels)[::2]
+    lines = axes.contour(frequency, pressure, table, shown, colors="white", linewidths=0.5)
+    bar = axes.figure.colorbar(filled, ax=axes, label=label, ticks=shown)
     bar.add_lines(lines)  # labels within the map would be cut off at its edges
