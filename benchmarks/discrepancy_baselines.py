@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from srs_opt.calibrate.fit import Point, priors, start_point, sum_eliminated
+from srs_opt.calibrate.experiment import Point
+from srs_opt.calibrate.fit import start_point
+from srs_opt.calibrate.objective import priors, sum_eliminated
 from srs_opt.discrepancy.pipeline import Discrepancy
 
 NO_SHAPE = 0.3  # correlation below which the nearest shape is no shape

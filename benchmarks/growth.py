@@ -19,8 +19,10 @@ from planners.maze.micromouse import read_micromouse
 from planners.maze.places import RobotSize
 from planners.search.costmap import cost_map
 from srs_opt.calibrate.coordinates import base_coordinates
-from srs_opt.calibrate.fit import Experiment, start_point, sum_eliminated
+from srs_opt.calibrate.experiment import Experiment
+from srs_opt.calibrate.fit import start_point
 from srs_opt.calibrate.model import Model
+from srs_opt.calibrate.objective import sum_eliminated
 from srs_opt.gait import Wave
 from srs_opt.gait_map.grid import gait_map, grid_points
 from srs_opt.gait_opt.catalogue import shipped_table

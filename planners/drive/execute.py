@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planners.drive.contact import BodyWatch
+from planners.drive.foresight import Foresight
 from planners.drive.halt import halt
-from planners.drive.track import Choice, Learned, Where, choose, nearest_node, reference_of
+from planners.drive.track import Choice, Learned, Where, by_plan, choose, nearest_node, reference_of
 from planners.motion.robots import undelayed
 from planners.plan.answer import Plan
 from planners.plan.solve import solve_with_lattice
@@ -28,6 +29,7 @@ from srs_opt.simulate.timeline import Timeline
 Array = NDArray[np.float64]
 ASTRAY_M = 0.06  # farther from the plan than this: plan anew
 STOP_CLEARANCE_M = -0.004  # a cycle that should by table run deeper into a wall than this is not begun
+ON_TRACK = (0.004, 0.004, 0.03, 0.04)  # off the plan's place (m), heading (rad), speed (m/s): it is played on
 MOST_TRIED = 8  # gaits, before a cycle is given up
 MOST_IDLE = 4  # cycles without progress along the plan
 MOST_REPLANS = 8
@@ -111,6 +113,7 @@ class _Drive:
         # commands reach the valves late by a constant: it is waited once, before the first cycle
         self.run = Integrator(undelayed(robot), problem.gaits.model)
         self.watch = BodyWatch(problem, robot, self.run)
+        self.foresight = Foresight(problem)
         self.delay_s = valve_delay_s(robot)
         start = problem.start
         self.state = self.run.rest(start.x, start.y, start.heading)
@@ -122,7 +125,9 @@ class _Drive:
         self.most_cycles = 20 + math.ceil(PATIENCE * len(plan.gaits))
 
     def _follow(self, plan: Plan) -> None:
-        self.reference = reference_of(self.problem, plan)
+        self.plan, self.reference = plan, reference_of(self.problem, plan)
+        self.ends = np.array([self._as_planned()[:4], *(state[:4] for state in plan.certificate.states)])
+        self.gaits_before = np.array([self.before, *plan.gaits])
         self.node = self.idle = 0
 
     def go(self) -> Execution:
@@ -155,25 +160,45 @@ class _Drive:
         return choice.gait
 
     def _choice(self) -> Choice:
-        """Return the best gait that the dynamic model, too, keeps off the walls.
+        """Return the plan's gait where the robot is as planned, else the best that keeps off the walls.
 
-        Where every one that was tried touches them, the first is returned with a clearance that forbids it.
+        It should do so with any friction that the robot may have, at least with the planned one. Where every
+        gait that was tried touches, the first is returned with a clearance that forbids it.
         """
         where = Where(self.state[:3].copy(), self.before, float(self.state[3]))
         state = self._as_planned()
+        planned = self._gait_by_plan(state)
+        if planned is not None and self._room_m(state, planned) > self.problem.margin_m / 2:
+            return by_plan(self.problem, where, self.learned, planned)
         tried: list[Choice] = []
+        second: Choice | None = None
         while len(tried) < MOST_TRIED:
             barred = [choice.gait for choice in tried]
             choice = choose(self.problem, self.reference, where, self.learned, self.node, barred)
-            if choice.clearance_m < STOP_CLEARANCE_M or self._simulated_room_m(state, choice.gait) > 0:
-                return choice
             tried.append(choice)
-        return replace(tried[0], clearance_m=-math.inf)
+            if choice.clearance_m < STOP_CLEARANCE_M:
+                break
+            if self._room_m(state, choice.gait) > 0:
+                if self._room_m(state, choice.gait, surely=True) > 0:
+                    return choice
+                second = second or choice
+        return second or replace(tried[0], clearance_m=-math.inf)
 
-    def _simulated_room_m(self, state: Array, gait: int) -> float:
-        """Return the planned robot's clearance over a cycle; minus infinity where the model cannot go on."""
-        (cycle,) = self.problem.simulate_all([(state, gait)])
-        return -math.inf if cycle is None else float(self.problem.body.exact(cycle.lines).min())
+    def _room_m(self, state: Array, gait: int, *, surely: bool = False) -> float:
+        """Return the clearance over a cycle: on the planned robot, or the least with any friction."""
+        played = self.problem.gaits.gaits[gait].gait
+        cycle = Timeline.of_gait(played, played.period_s)
+        foresee = self.foresight.least_room_m if surely else self.foresight.room_m
+        return foresee(state, cycle)
+
+    def _gait_by_plan(self, state: Array) -> int | None:
+        """Return the gait that the plan plays next, if the robot is as the plan has it after a cycle."""
+        off = np.abs(state[:4] - self.ends[:-1])
+        off[:, 2] = np.abs((off[:, 2] + math.pi) % (2 * math.pi) - math.pi)
+        off = (off / ON_TRACK).max(axis=1)
+        off[self.gaits_before[:-1] != self.before] = math.inf
+        cycle = int(off.argmin())
+        return self.plan.gaits[cycle] if off[cycle] < 1 else None
 
     def _plan_anew(self) -> bool:
         """Look for a way from here; the model takes over place, speed and curvature."""
@@ -232,7 +257,7 @@ class _Drive:
     def _halt(self) -> bool:
         """Bring the robot to rest where there is room for it; return whether it came to no harm."""
         self.halts += 1
-        trajectory = self.run.run(halt(self.problem, self._as_planned()), self.state)
+        trajectory = self.run.run(halt(self.foresight, self._as_planned()), self.state)
         self.watch.look(trajectory.time_s, trajectory.pose, trajectory.kappa, ends=False)
         self.state = trajectory.final
         self.before = self.problem.motion.rest

@@ -197,6 +197,14 @@ def choose(
     return replace(best.first, astray_m=float(np.hypot(*offset.T).min()))
 
 
+def by_plan(problem: Problem, where: Where, learned: Learned, gait: int) -> Choice:
+    """Return a gait that is played because the plan says so; its clearance is somebody else's to look at."""
+    local = learned.apply(
+        problem.motion.move(0.0, 0.0, 0.0, where.gait, where.speed_m_s).pose, problem.motion.period_s
+    )
+    return Choice(gait, local[gait, -1], math.inf, 0.0)
+
+
 def nearest_node(reference: Reference, pose: Array, after: int) -> int:
     """Return the node nearest to a place, not before `after` and not far beyond it."""
     window = reference.pose[after : after + 4 * NODES_PER_CYCLE, :2]

@@ -16,7 +16,7 @@ from srs_opt.measurement.records import Trial
 from srs_opt.processes import workers_deaf_to_interrupts
 
 if TYPE_CHECKING:
-    from srs_opt.calibrate.fit import Experiment, Extra, Point
+    from srs_opt.calibrate.experiment import Experiment, Extra, Point
 
 
 def helped(
@@ -124,7 +124,7 @@ def _serve(
     keeps: bool,
 ) -> None:
     """Answer requests until told to stop."""
-    from srs_opt.calibrate.fit import Experiment
+    from srs_opt.calibrate.experiment import Experiment
     from srs_opt.calibrate.model import Model
 
     experiment = Experiment(Model(robot, model), trials, sd_m, tolerance_m_s=tolerance_m_s, keeps=keeps)

@@ -10,14 +10,23 @@ from typing import Protocol
 import numpy as np
 
 from srs_opt.calibrate.coordinates import Coordinate
-from srs_opt.calibrate.experiment import Experiment, Extra, Point
-from srs_opt.calibrate.gram import Solution, TrialGram, bounded_solve
+from srs_opt.calibrate.experiment import Point
+from srs_opt.calibrate.gram import TrialGram
+from srs_opt.calibrate.objective import (
+    CORRELATED,
+    excess_of,
+    misfit_ratio,
+    newton_step,
+    objective,
+    priors,
+    temper_of,
+    within_reach,
+)
 from srs_opt.errors import NoAnswerError
 from srs_opt.measurement.records import Trial
 
 ITERATIONS = 12
 CONVERGED = 0.05  # of the deviance: a fifth of a standard deviation
-CORRELATED = 100.0  # values of a track that a smooth misfit makes count as one
 LONGEST_LOG_STEP = 0.7
 HOPELESS = 300.0  # deviance that even the linearisation promises to stay behind the one to beat
 TRIED = 2  # iterations before that is believed
@@ -95,28 +104,6 @@ def start_point(coordinates: Sequence[Coordinate]) -> Point:
     return Point({c.name: c.start for c in coordinates})
 
 
-def priors(coordinates: Sequence[Coordinate], point: Point) -> tuple[np.ndarray, np.ndarray]:
-    """Return precision and offset of the priors at `point`."""
-    precision = np.array([0.0 if np.isinf(c.prior_sd) else c.prior_sd**-2 for c in coordinates])
-    offset = np.array([point.values.get(c.name, c.start) - c.start for c in coordinates])
-    return precision, offset
-
-
-def misfit_ratio(grams: Mapping[str, TrialGram]) -> float:
-    """Return the sum of squared residuals over its expectation under noise alone."""
-    return sum(g.misfit for g in grams.values()) / sum(g.count for g in grams.values())
-
-
-def temper_of(grams: Mapping[str, TrialGram], correlated: float = CORRELATED) -> float:
-    """Return the factor on the noise variance that a misfit calls for.
-
-    What a wrong model leaves behind is smooth in time and alike over the markers, so that `correlated` values
-    count as one; without this, thousands of frames would pull the parameters far from their bench values.
-    """
-    count, ratio = sum(g.count for g in grams.values()), misfit_ratio(grams)
-    return 1 + correlated * max(0.0, ratio - 1 - 4 * math.sqrt(2 / count))
-
-
 def fit(
     experiment: Measured,
     coordinates: Sequence[Coordinate],
@@ -155,105 +142,134 @@ def fit(
         names = {c.name for c in coordinates}
         kept = {n: v for n, v in start.values.items() if n in names}
         point = Point({**point.values, **kept}, dict(start.scatter))
-    trials = experiment.trials if trials is None else trials
-    grams = experiment.grams(point, coordinates, trials)
-    at_start = misfit_ratio(grams)
-    done, idle, converged, damping, behind = 0, 0, False, 0.0, math.inf
-    while True:
-        temper = temper_of(grams, correlated)
-        now = objective(coordinates, grams, point, temper)
-        stale = any(g.stale for g in grams.values())
-        enough = max(CONVERGED, near * _excess(grams) / temper) if temper > FAR_OFF else CONVERGED
-        missing = now - within_reach(coordinates, grams, point, temper)
-        jitter = max(CONVERGED, JITTER * sum(g.count for g in grams.values()) / temper)
-        if missing < enough:
-            if not stale:
-                converged = True
-                break
-            grams = experiment.grams(point, coordinates, trials)
-            continue
-        if done >= iterations or idle >= IDLE or damping > MOST_DAMPING:
-            converged = missing < jitter and not stale
+    descent = _Descent(
+        experiment, coordinates, experiment.trials if trials is None else trials, correlated, near
+    )
+    descent.begin(point)
+    while not (descent.arrived() or descent.spent(iterations)):
+        descent.step()
+        if descent.hopeless(beat):
             break
-        done += 1
-        moved, promised = _moved(point, coordinates, grams, temper, damping)
+        if report is not None:
+            report(f"misfit {sum(g.misfit for g in descent.grams.values()):.0f}")
+    return descent.end()
+
+
+class _Descent:
+    """Steps towards the most probable point; slopes are kept while they predict what a step gains."""
+
+    def __init__(
+        self,
+        experiment: Measured,
+        coordinates: tuple[Coordinate, ...],
+        trials: Sequence[Trial],
+        correlated: float,
+        near: float,
+    ) -> None:
+        self.experiment, self.coordinates, self.trials = experiment, coordinates, trials
+        self.correlated, self.near = correlated, near
+        self.done, self.idle, self.damping = 0, 0, 0.0
+        self.converged, self.behind = False, math.inf
+
+    def begin(self, point: Point) -> None:
+        """Linearise where the fit starts."""
+        self.point = point
+        self.refresh()
+        self.at_start = misfit_ratio(self.grams)
+
+    def refresh(self) -> None:
+        """Take the slopes anew."""
+        self.grams = self.experiment.grams(self.point, self.coordinates, self.trials)
+
+    @property
+    def stale(self) -> bool:
+        """Whether slopes are those of an earlier point."""
+        return any(g.stale for g in self.grams.values())
+
+    @property
+    def temper(self) -> float:
+        """Factor on the noise variance."""
+        return temper_of(self.grams, self.correlated)
+
+    @property
+    def jitter(self) -> float:
+        """Deviance below which a loss is the integration's."""
+        return max(CONVERGED, JITTER * sum(g.count for g in self.grams.values()) / self.temper)
+
+    def now(self) -> float:
+        """Return the objective at the point."""
+        return objective(self.coordinates, self.grams, self.point, self.temper)
+
+    def missing(self) -> float:
+        """Return what the linearisation promises to gain."""
+        return self.now() - within_reach(self.coordinates, self.grams, self.point, self.temper)
+
+    def arrived(self) -> bool:
+        """Whether fresh slopes promise to gain next to nothing."""
+        while True:
+            enough, temper = CONVERGED, self.temper
+            if temper > FAR_OFF:
+                enough = max(CONVERGED, self.near * excess_of(self.grams) / temper)
+            if self.missing() >= enough:
+                return False
+            if not self.stale:
+                self.converged = True
+                return True
+            self.refresh()
+
+    def spent(self, iterations: int) -> bool:
+        """Whether to give up; what the integration's jitter hides then still counts as converged."""
+        if self.done < iterations and self.idle < IDLE and self.damping <= MOST_DAMPING:
+            return False
+        self.converged = not self.stale and self.missing() < self.jitter
+        return True
+
+    def step(self) -> None:
+        """Go on where that gains, else take fresh slopes or damp the next step."""
+        self.done += 1
+        stale, temper, now, jitter = self.stale, self.temper, self.now(), self.jitter
+        moved, promised = _moved(self.point, self.coordinates, self.grams, temper, self.damping)
         try:
-            new_grams = experiment.grams(moved, coordinates, trials, stale=True)
-            moved = _tamed(experiment, coordinates, trials, (point, grams), (moved, new_grams), temper)
-            gain = now - objective(coordinates, new_grams, moved, temper)
+            grams = self.experiment.grams(moved, self.coordinates, self.trials, stale=True)
+            before, after = (self.point, self.grams), (moved, grams)
+            moved = _tamed(self.experiment, self.coordinates, self.trials, before, after, temper)
+            gain = now - objective(self.coordinates, grams, moved, temper)
         except NoAnswerError:
             gain = -math.inf
         if gain > -jitter:
-            idle = idle + 1 if gain < CONVERGED and damping < 1 and not stale else 0
-            point, grams = moved, new_grams
-            damping = 0.0 if damping < 0.02 else damping * 0.3
+            self.idle = self.idle + 1 if gain < CONVERGED and self.damping < 1 and not stale else 0
+            self.point, self.grams = moved, grams
+            self.damping = 0.0 if self.damping < 0.02 else self.damping * 0.3
             if abs(gain - promised) > TRUSTED * promised:
-                grams = experiment.grams(point, coordinates, trials)
+                self.refresh()
         elif stale:
-            grams = experiment.grams(point, coordinates, trials)
+            self.refresh()
         else:
-            damping = max(damping * 4, 0.1)
-        excess = within_reach(coordinates, grams, point) - beat
-        if done >= TRIED and excess > HOPELESS and excess > 0.5 * behind:
-            break
-        behind = excess
-        if report is not None:
-            report(f"misfit {sum(g.misfit for g in grams.values()):.0f}")
-    if any(g.stale for g in grams.values()):
-        grams = experiment.grams(point, coordinates, trials)
-    temper = temper_of(grams, correlated)
-    return Fit(
-        coordinates,
-        point,
-        _step(coordinates, grams, point, temper).covariance,
-        objective(coordinates, grams, point, 1.0),
-        misfit_ratio(grams),
-        temper,
-        grams,
-        done,
-        converged,
-        at_start,
-    )
+            self.damping = max(self.damping * 4, 0.1)
 
+    def hopeless(self, beat: float) -> bool:
+        """Whether the fit stays far behind the one to beat, and does not catch up."""
+        excess = within_reach(self.coordinates, self.grams, self.point) - beat
+        late = self.done >= TRIED and excess > HOPELESS and excess > 0.5 * self.behind
+        self.behind = excess
+        return late
 
-def objective(
-    coordinates: Sequence[Coordinate], grams: Mapping[str, TrialGram], point: Point, temper: float
-) -> float:
-    """Return -2 log posterior at `point` with the trials' scatter integrated out."""
-    precision, offset = priors(coordinates, point)
-    parts = [g.eliminated(temper) for g in grams.values()]
-    return float(sum(e.at_point + e.log_det for e in parts) + precision @ offset**2)
-
-
-def within_reach(
-    coordinates: tuple[Coordinate, ...], grams: Mapping[str, TrialGram], point: Point, temper: float = 1.0
-) -> float:
-    """Return the deviance at the minimum that the linearisation promises."""
-    log_det = sum(g.eliminated(temper).log_det for g in grams.values())
-    return _step(coordinates, grams, point, temper).deviance + log_det
-
-
-def _excess(grams: Mapping[str, TrialGram]) -> float:
-    """Return the misfit beyond what noise leaves."""
-    return sum(max(g.misfit - g.count, 0.0) for g in grams.values())
-
-
-def _step(
-    coordinates: tuple[Coordinate, ...],
-    grams: Mapping[str, TrialGram],
-    point: Point,
-    temper: float,
-    damping: float = 0.0,
-) -> Solution:
-    """Solve for the step, holding coordinates that would leave their bounds at the bound."""
-    precision, offset = priors(coordinates, point)
-    now = np.array([point.values[c.name] for c in coordinates])
-    lower = np.array([c.lower for c in coordinates])
-    total = sum_eliminated(grams, temper)
-    if damping:
-        own = np.arange(len(coordinates))
-        total[own, own] += damping * (total[own, own] + precision)
-    return bounded_solve(total, range(len(coordinates)), precision, offset, lower - now)
+    def end(self) -> Fit:
+        """Return the fit at the point, its slopes fresh."""
+        if self.stale:
+            self.refresh()
+        return Fit(
+            self.coordinates,
+            self.point,
+            newton_step(self.coordinates, self.grams, self.point, self.temper).covariance,
+            objective(self.coordinates, self.grams, self.point, 1.0),
+            misfit_ratio(self.grams),
+            self.temper,
+            self.grams,
+            self.done,
+            self.converged,
+            self.at_start,
+        )
 
 
 def _moved(
@@ -264,7 +280,7 @@ def _moved(
     damping: float,
 ) -> tuple[Point, float]:
     """Return the point after a step within reason, and the deviance that it promises to gain."""
-    step = _step(coordinates, grams, point, temper, damping).step
+    step = newton_step(coordinates, grams, point, temper, damping).step
     for k, c in enumerate(coordinates):
         if not c.effect or "log_" in c.name:
             step[k] = np.clip(step[k], -LONGEST_LOG_STEP, LONGEST_LOG_STEP)
@@ -324,11 +340,3 @@ def _tamed(
             if own(found[t.name]) < own(new_grams[t.name]):
                 new_grams[t.name], scatter[t.name] = found[t.name], tried[t.name]
     return Point(moved.values, scatter)
-
-
-def sum_eliminated(grams: Mapping[str, TrialGram], temper: float = 1.0) -> np.ndarray:
-    """Return the sum of the trials' matrices, scatter integrated out."""
-    return np.sum([g.eliminated(temper).matrix for g in grams.values()], axis=0)
-
-
-__all__ = ["Experiment", "Extra", "Fit", "Measured", "Point", "fit"]

@@ -10,9 +10,10 @@ import numpy as np
 
 from srs_opt.calibrate.coordinates import FRICTION_SPEED, SCATTER_SD, Coordinate, base_coordinates
 from srs_opt.calibrate.experiment import Experiment, Point
-from srs_opt.calibrate.fit import fit, priors, start_point, sum_eliminated
+from srs_opt.calibrate.fit import fit, start_point
 from srs_opt.calibrate.gram import TrialGram, solve
 from srs_opt.calibrate.model import Model
+from srs_opt.calibrate.objective import priors, sum_eliminated
 from srs_opt.calibrate.result import Calibration, calibration
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Wave

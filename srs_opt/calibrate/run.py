@@ -7,7 +7,8 @@ from collections.abc import Callable
 
 from srs_opt.calibrate.coordinates import base_coordinates
 from srs_opt.calibrate.crew import helped
-from srs_opt.calibrate.fit import Experiment, fit, start_point
+from srs_opt.calibrate.experiment import Experiment
+from srs_opt.calibrate.fit import fit, start_point
 from srs_opt.calibrate.maps import fit_maps
 from srs_opt.calibrate.model import Model
 from srs_opt.calibrate.noise import noise_sd_m

@@ -21,7 +21,8 @@ def build_parser() -> Parser:
         "Find where simulation and measured data disagree, name the missing effect or abstain, show the gap\n"
         "shrink on trials that no fit saw. Writes report.html and corrected_robot.yaml.\n"
         "JSON: verdict (no_gap, named, one_of, unknown, not_testable), effects, alternatives, located,\n"
-        "gap (m, root mean square per coordinate), next_experiment, candidates, corrected_robot, seconds.",
+        "gap (m, root mean square per coordinate), next_experiment, candidates, corrected_robot, seconds;\n"
+        "with --payoff also payoff (m/s, rad/s; null where nothing was named).",
         "python -m srs_opt.discrepancy data/my_set --json",
         robot=False,
         sweep=True,
@@ -33,6 +34,12 @@ def build_parser() -> Parser:
         metavar="FILE",
         help="YAML list of effect names to consider (default: all that are known)",
     )
+    parser.add_argument(
+        "--payoff",
+        action="store_true",
+        help="also optimize the fastest gait of the calibrated and of the corrected robot, and show what the "
+        "name changes (half a minute when first compiled, then some seconds)",
+    )
     parser.add_argument("--model", choices=("complex", "simplified"), default="complex", help="dynamic model")
     return parser
 
@@ -40,6 +47,7 @@ def build_parser() -> Parser:
 def run(options: argparse.Namespace) -> Answer:
     """Find the discrepancy; write the report and the corrected robot."""
     from srs_opt.discrepancy.answer import answer, corrected_robot
+    from srs_opt.discrepancy.payoff import payoff
     from srs_opt.discrepancy.pipeline import find_discrepancy
     from srs_opt.discrepancy.report import write_report
     from srs_opt.measurement.dataset import load_dataset
@@ -61,8 +69,13 @@ def run(options: argparse.Namespace) -> Answer:
     if robot is not None:
         files.append(save_robot(robot, options.out / "corrected_robot.yaml"))
     record = answer(found, files[0] if files else None)
+    summary = _summary(found)
+    if options.payoff:
+        gains = payoff(found, options.model, lambda message: say(options, message))
+        record["payoff"] = None if gains is None else gains.to_record() | {"words": gains.in_words()}
+        summary += "" if gains is None else f"\n{gains.in_words()}"
     files.append(write_report(found, record, options.out / "report.html"))
-    return Answer(record, _summary(found), good=found.verdict.word != "not_testable", files=tuple(files))
+    return Answer(record, summary, good=found.verdict.word != "not_testable", files=tuple(files))
 
 
 def _effect_names(path: Path) -> list[str]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from srs_opt.calibrate.fit import Experiment, Point
+from srs_opt.calibrate.experiment import Experiment, Point
 from srs_opt.calibrate.gram import bounded_solve
 from srs_opt.discrepancy.hypothesis import Hypothesis
 from srs_opt.discrepancy.select import Selection

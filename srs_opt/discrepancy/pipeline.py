@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 from srs_opt.calibrate.coordinates import Candidate, all_candidates, base_coordinates
 from srs_opt.calibrate.crew import helped
-from srs_opt.calibrate.fit import FAR_OFF, Experiment
+from srs_opt.calibrate.experiment import Experiment
+from srs_opt.calibrate.fit import FAR_OFF
 from srs_opt.calibrate.model import Model
 from srs_opt.calibrate.noise import noise_sd_m
 from srs_opt.discrepancy.design import NextExperiment, next_experiment, rivals_of

@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from srs_opt.calibrate.coordinates import Candidate, Coordinate
-from srs_opt.calibrate.fit import Point, priors, sum_eliminated
+from srs_opt.calibrate.experiment import Point
 from srs_opt.calibrate.gram import TrialGram, bounded_solve
+from srs_opt.calibrate.objective import priors, sum_eliminated
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from srs_opt.calibrate.fit import CORRELATED, Experiment, Fit, Point
+from srs_opt.calibrate.experiment import Experiment, Point
+from srs_opt.calibrate.fit import Fit
+from srs_opt.calibrate.objective import CORRELATED
 from srs_opt.measurement.records import Trial
 
 BLOCK_S = 0.5

@@ -9,7 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from srs_opt.calibrate.coordinates import Candidate, Coordinate
-from srs_opt.calibrate.fit import FAR_OFF, Experiment, Fit, Point, priors, start_point, sum_eliminated
+from srs_opt.calibrate.experiment import Experiment, Point
+from srs_opt.calibrate.fit import FAR_OFF, Fit, start_point
+from srs_opt.calibrate.objective import priors, sum_eliminated
 from srs_opt.discrepancy.detect import Detection, detect, project
 from srs_opt.discrepancy.functions import Group, ResidualFunctions
 from srs_opt.discrepancy.hypothesis import ITERATIONS, SMALL, Hypothesis, fit_hypothesis

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from srs_opt.calibrate.fit import priors
 from srs_opt.calibrate.gram import bounded_solve
+from srs_opt.calibrate.objective import priors
 from srs_opt.discrepancy.hypothesis import Hypothesis
 from srs_opt.discrepancy.search import RIVAL
 from srs_opt.discrepancy.split import Split

@@ -10,12 +10,13 @@ from typing import Any
 
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait, published_wave
-from srs_opt.gait_opt.aim import aimed, end_for_end, in_step
+from srs_opt.gait_opt.aim import end_for_end, in_step
 from srs_opt.gait_opt.collocation.problem import CycleProblem
 from srs_opt.gait_opt.finish import finished
 from srs_opt.gait_opt.goal import Goal, Limits
 from srs_opt.gait_opt.ladder import Climb, Rung, climb, ladder
-from srs_opt.gait_opt.starts import best_start, turn_miss
+from srs_opt.gait_opt.score import score
+from srs_opt.gait_opt.starts import best_start, plain_waves
 from srs_opt.gait_opt.table import GaitTable, TableGait
 from srs_opt.gait_opt.wishes import Wish, generations, wishes
 from srs_opt.orbit.steady import Orbit, steady_gait
@@ -125,20 +126,29 @@ def _kept(wish: Wish, entry: TableGait) -> bool:
 
 
 def _solve(problem: CycleProblem, task: Task) -> Climb:
-    own, start = problem.robots[0].friction_speed_m_s, task.start
-    if task.wish.after is None:
+    """Return the best climb from the neighbour's gait and plain waves.
+
+    A band makes starts hard to compare before they are optimized: then the best of either kind is.
+    """
+    neighbour, waves = [task.start], plain_waves(problem)
+    band = task.wish.band_m
+    kinds = [neighbour + waves] if band is None else [neighbour, waves]
+    found = [_climbed(problem, best_start(problem, gaits), task.wish) for gaits in kinds]
+    return max(found, key=lambda climb: climb.score.total)
+
+
+def _climbed(problem: CycleProblem, start: Gait, wish: Wish) -> Climb:
+    own = problem.robots[0].friction_speed_m_s
+    if wish.after is None:
         return climb(problem, start, ladder(own))
-    if problem.goal.envelope_m is None:
-        start = best_start(problem, start)
-    elif problem.goal.radius_m is not None:
-        start = aimed(start, turn_miss(problem), 0.02)
     last = Rung(own, 70, 0.03, 2)
     found = climb(problem, start, (Rung(max(own, 0.004), 60, 0.06, 3), last))
-    band = task.wish.band_m
+    band = wish.band_m
     if band is not None and (excess := sum(found.orbits[0].envelope_m) - band) > _BAND_EXCESS * band:
         # the mesh sees the body's reach at some instants only: ask for less by as much as it missed
         less = replace(problem, goal=replace(problem.goal, envelope_m=band - excess))
-        found = climb(less, found.gait, (last,))
+        again = climb(less, found.gait, (last,))
+        found = replace(again, score=score(problem, again.gait, again.orbits))
     return found
 
 

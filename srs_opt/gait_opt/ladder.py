@@ -34,6 +34,8 @@ _PATIENT = {"mu_strategy": "monotone", "mu_init": 1e-3, "max_iter": 80}
 # simulation judges every solve: where nothing but the speed counts, a rough optimum soon is worth more than a
 # sharp one late; turns and bands get stuck that way
 _QUICK = {"mu_strategy": "monotone", "mu_init": 1e-4, "tol": 1e-3, "max_iter": 40}
+# the tightest turn lies far from every start: there, solves may wander through what is no motion
+_ROAMING = {**_PATIENT, "theta_max_fact": 1e4}
 _QUICK_ELEMENTS, _FINEST_QUICK = ((0.1, 24), (0.03, 28), (0.01, 36), (0.004, 50)), 60
 _UNIFORM_SHARE = 0.5  # of the mesh; the rest follows the simulation's steps
 _STATE_LIMIT = 4.0  # scaled states stay below
@@ -239,7 +241,8 @@ def solve_from(
     parameters = problem.parameters(p, mesh, scales, rung.friction_speed_m_s, worth.scale)
     z[p.layout.merit] = worth.merit / worth.scale
     unknowns, rows, binding = bounded(problem, p, z, reach)
-    solution = p.solve(z, parameters, unknowns, rows, options=_QUICK if rung.quick else _PATIENT)
+    options = _QUICK if rung.quick else _ROAMING if problem.goal.tightest else _PATIENT
+    solution = p.solve(z, parameters, unknowns, rows, options=options)
     return solution, p, binding(solution.z)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
@@ -20,7 +20,7 @@ from srs_opt.orbit.steady import steady_gait
 
 _SMOOTHED_M_S = 0.1
 _AIM_RAD_S = 0.02
-_PRESSURE_SHARES, _WAVES_ON_BODY = (0.7, 0.85, 1.0), (0.7, 0.85)
+_PRESSURE_SHARES, _WAVES_ON_BODY = (0.45, 0.55, 0.7, 0.85, 1.0), (0.7, 0.85)
 
 
 def starting_gaits(problem: CycleProblem, count: int, seed: int) -> list[Gait]:
@@ -60,10 +60,8 @@ def steered(problem: CycleProblem, gait: Gait) -> Gait:
         return gait
 
 
-def best_start(problem: CycleProblem, gait: Gait) -> Gait:
-    """Return the best, simulated, of the gait and a few uniform waves, all leaned towards the wanted turn.
-
-    A neighbour's optimum can lead into a corner of the rugged landscape that a plain wave does not know.
+def best_start(problem: CycleProblem, gaits: Sequence[Gait]) -> Gait:
+    """Return the best, simulated, of some gaits leaned towards the wanted turn.
 
     Raises
     ------
@@ -71,7 +69,7 @@ def best_start(problem: CycleProblem, gait: Gait) -> Gait:
         If none of them has a steady state.
     """
     found: list[tuple[float, int, Gait]] = []
-    for k, start in enumerate([gait, *_plain_waves(problem)]):
+    for k, start in enumerate(gaits):
         with suppress(NoAnswerError):
             if problem.goal.radius_m is not None:
                 start = aimed(start, turn_miss(problem), _AIM_RAD_S)
@@ -81,19 +79,19 @@ def best_start(problem: CycleProblem, gait: Gait) -> Gait:
     return max(found)[-1]
 
 
-def _plain_waves(problem: CycleProblem) -> list[Gait]:
+def plain_waves(problem: CycleProblem) -> list[Gait]:
+    """Return uniform waves from slim to strong.
+
+    A neighbour's optimum can lead into a corner of the rugged landscape that a plain wave does not know.
+    """
     robot, limits = problem.robots[0], problem.limits
     least, most = limits.pressure_kpa
+    pressures = [share * most for share in _PRESSURE_SHARES if share * most >= least]
+    lags = [waves * 2 * math.pi / robot.links for waves in _WAVES_ON_BODY]
     return [
-        Wave.uniform(
-            robot.segments,
-            limits.frequency_hz[1],
-            max(least, share * most),
-            lag * 2 * math.pi / robot.links,
-            0.0,
-        ).gait()
-        for share in _PRESSURE_SHARES
-        for lag in _WAVES_ON_BODY
+        Wave.uniform(robot.segments, limits.frequency_hz[1], pressure, lag).gait()
+        for pressure in pressures
+        for lag in lags
     ]
 
 

@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 from srs_opt.calibrate.coordinates import Coordinate
-from srs_opt.calibrate.fit import CONVERGED, Point, fit, objective, within_reach
+from srs_opt.calibrate.experiment import Point
+from srs_opt.calibrate.fit import CONVERGED, fit
 from srs_opt.calibrate.gram import trial_gram
+from srs_opt.calibrate.objective import objective, within_reach
 
 TRUTH = np.array([0.4, 1.2])
 COORDINATES = (Coordinate("size.of_it", "size"), Coordinate("width.of_it", "width"))

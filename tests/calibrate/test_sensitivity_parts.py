@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from srs_opt.calibrate.coordinates import all_candidates, base_coordinates
-from srs_opt.calibrate.fit import Experiment, Point, start_point
+from srs_opt.calibrate.experiment import Experiment, Point
+from srs_opt.calibrate.fit import start_point
 from srs_opt.calibrate.model import Model
 from srs_opt.calibrate.nominal import FINEST_M_S, TOLERANCE_M_S, conditions_of, tolerance_for
 from srs_opt.calibrate.sensitivity import _solve, variation

@@ -8,6 +8,8 @@ import pytest
 
 from srs_opt.calibrate.__main__ import main as calibrate
 from srs_opt.discrepancy.__main__ import main as discrepancy
+from srs_opt.gait import Gait
+from srs_opt.orbit.steady import steady_gait
 from srs_opt.robot import load_robot
 from virtual_lab.dataset import Recording, write_dataset
 from virtual_lab.draw import draw_truth
@@ -58,7 +60,7 @@ def test_nothing_hidden_is_nothing_found(tmp_path, capsys):
 @pytest.mark.slow
 def test_a_tether_is_named_and_closes_the_gap(tmp_path, capsys):
     folder, truth = lab(tmp_path / "set", ("tether_drag",))
-    _, said = ask(discrepancy, folder, capsys, out=tmp_path / "out")
+    _, said = ask(discrepancy, folder, capsys, "--payoff", out=tmp_path / "out")
     assert said["verdict"] == "named"
     (effect,) = said["effects"]
     assert effect["name"] == "tether_drag"
@@ -67,6 +69,10 @@ def test_a_tether_is_named_and_closes_the_gap(tmp_path, capsys):
     assert said["gap"]["ratio"] < 0.15
     robot = load_robot(said["corrected_robot"])
     assert robot.effects[0]["name"] == "tether_drag"
+    gains = {kind: said["payoff"][kind]["speed_m_s"] for kind in ("promised", "before", "after")}
+    assert gains["promised"] > gains["after"] > gains["before"]  # a hose makes the promise hollow
+    played = steady_gait(robot, Gait.of_record(said["payoff"]["gait_after"]))
+    assert played.speed_m_s == pytest.approx(gains["after"], rel=1e-3)
     page = (tmp_path / "out" / "report.html").read_text()
     assert "tether_drag" in page and "http" not in page and "data:image/png" in page
 

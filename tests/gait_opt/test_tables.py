@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from srs_opt.errors import InputError
+from srs_opt.gait import Wave
 from srs_opt.gait_opt import family
 from srs_opt.gait_opt.catalogue import default_table, shipped_table
 from srs_opt.gait_opt.export import c_header, write_csv, write_header
@@ -56,6 +57,25 @@ def test_shipped_gaits_do_what_the_table_says(table):
         assert orbit.speed_m_s == pytest.approx(entry.speed_m_s, rel=2e-3)
         assert orbit.turn_rate_rad_s == pytest.approx(entry.turn_rate_rad_s, abs=5e-3)
         assert sum(orbit.envelope_m) == pytest.approx(sum(entry.envelope_m), rel=2e-2)
+
+
+@pytest.mark.parametrize("radius_m", [0.784, 0.314, 0.176, 0.118])
+def test_no_plain_wave_turns_faster_than_the_table(table, radius_m):
+    """Waves of three pressures and two lags, their offset found by bisection so that they turn as tightly."""
+    (entry,) = [g for g in table.gaits if g.name == f"fast R{radius_m:g} left"]
+    for pressure_kpa in (40.0, 48.0, 55.0):
+        for lag_rad in (0.9, 1.05):
+            speed_m_s = _speed_on_circle(pressure_kpa, lag_rad, radius_m)
+            assert speed_m_s <= 1.003 * entry.speed_m_s
+
+
+def _speed_on_circle(pressure_kpa, lag_rad, radius_m):
+    low, high = 0.0, 0.8
+    for _ in range(14):
+        offset = (low + high) / 2
+        orbit = steady_gait(ROBOT, Wave.uniform(4, 2.0, pressure_kpa, lag_rad, offset).gait())
+        low, high = (offset, high) if orbit.turn_rate_rad_s < orbit.speed_m_s / radius_m else (low, offset)
+    return orbit.speed_m_s if abs(orbit.turn_rate_rad_s * radius_m / orbit.speed_m_s - 1) < 0.01 else 0.0
 
 
 def test_images_are_mirror_images(table):

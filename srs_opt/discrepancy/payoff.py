@@ -1,0 +1,108 @@
+"""What the name buys: the fastest gaits of the calibrated and the corrected robot, on the corrected one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from srs_opt.calibrate.result import calibrated_robot
+from srs_opt.discrepancy.answer import corrected_robot
+from srs_opt.discrepancy.pipeline import Discrepancy
+from srs_opt.discrepancy.verdict import NAMED, ONE_OF
+from srs_opt.errors import NoAnswerError
+from srs_opt.gait import Gait
+from srs_opt.gait_opt.collocation.problem import CycleProblem
+from srs_opt.gait_opt.goal import Goal, Limits
+from srs_opt.gait_opt.search import search
+from srs_opt.model.parameters import room_effects
+from srs_opt.orbit.steady import Orbit, steady_gait
+from srs_opt.robot import Robot
+
+STARTS = 2
+
+
+@dataclass(frozen=True)
+class Payoff:
+    """Straight gaits, each the fastest of one robot.
+
+    Attributes
+    ----------
+    promised : Orbit
+        Optimized for the calibrated robot, and simulated on it.
+    before : Orbit
+        The same gait simulated on the corrected robot: what the promise is worth.
+    after : Orbit
+        Optimized for the corrected robot, and simulated on it.
+    left_out : tuple of str
+        Effects that know the room: no steady gait shows them.
+    """
+
+    promised: Orbit
+    before: Orbit
+    after: Orbit
+    left_out: tuple[str, ...]
+
+    def to_record(self) -> dict[str, Any]:
+        """Return the `payoff` entry of the command's JSON."""
+        orbits = {"promised": self.promised, "before": self.before, "after": self.after}
+        return {
+            **{
+                name: {"speed_m_s": orbit.speed_m_s, "turn_rate_rad_s": orbit.turn_rate_rad_s}
+                for name, orbit in orbits.items()
+            },
+            "gait_before": self.before.gait.record(),
+            "gait_after": self.after.gait.record(),
+            "effects_left_out": list(self.left_out),
+        }
+
+    def in_words(self) -> str:
+        """Return two sentences."""
+        said = (
+            f"the calibrated robot's fastest straight gait promises {self.promised.speed_m_s:.3f} m/s; "
+            f"on the corrected robot it makes {_motion(self.before)}. The corrected robot's own makes "
+            f"{_motion(self.after)}"
+        )
+        if self.left_out:
+            said += f" (without {', '.join(self.left_out)}: no steady gait shows what depends on the room)"
+        return said
+
+
+def _motion(orbit: Orbit) -> str:
+    return f"{orbit.speed_m_s:.3f} m/s and turns by {orbit.turn_rate_rad_s:+.3f} rad/s"
+
+
+def payoff(
+    found: Discrepancy, model: str = "complex", tell: Callable[[str], None] = lambda message: None
+) -> Payoff | None:
+    """Return what the named effects change; None where none was named, or where a robot has no gait.
+
+    Parameters
+    ----------
+    found : Discrepancy
+    model : {"complex", "simplified"}
+        With which it was found.
+    tell : callable
+        Gets messages about the progress.
+    """
+    after = corrected_robot(found)
+    if found.verdict.word not in (NAMED, ONE_OF) or after is None or found.null is None:
+        return None
+    before = calibrated_robot(found.dataset.robot, found.null.hypothesis.fit)
+    try:
+        gaits = [_fastest(robot, model, tell) for robot in (before, after)]
+        return Payoff(
+            steady_gait(before, gaits[0], model),
+            steady_gait(after, gaits[0], model),
+            steady_gait(after, gaits[1], model),
+            tuple(room_effects(after)),
+        )
+    except NoAnswerError as error:
+        tell(f"what the name changes is not shown: {error}")
+        return None
+
+
+def _fastest(robot: Robot, model: str, tell: Callable[[str], None]) -> Gait:
+    tell(f"optimizing the fastest gait of '{robot.name}'{' with its effects' if robot.effects else ''}")
+    problem = CycleProblem((robot,), model, Goal("speed"), Limits().for_robot(robot))
+    return search(problem, starts=STARTS).gait
