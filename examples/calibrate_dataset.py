@@ -22,7 +22,7 @@ def main(out: Path = Path("out/examples")) -> float:
     for name, estimate in found.parameters.items():
         bench, true, sd = getattr(dataset.robot, name), truth["parameters"][name], found.sd[name]
         errors.append(abs(estimate - true) / sd)
-        print(f"{name:32s} bench {bench:.4f}  calibrated {estimate:.4f} ± {sd:.4f}  true {true:.4f}")
+        print(f"{name:32s} bench {bench:.4f}  calibrated {estimate:.4f} +- {sd:.4f}  true {true:.4f}")
     print(f"misfit over noise: {found.before:.2f} before, {found.after:.2f} after")
     return max(errors)
 

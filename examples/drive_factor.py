@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from srs_opt.drive.calibration import fit_calibration
-from srs_opt.figures import COLOURS, PAGE_IN, new_figure, save_figure, styled
+from srs_opt.figures import COLOURS, PAGE_IN, line_key, new_figure, save_figure, styled
 from srs_opt.gait_map.grid import gait_map, grid_points
 from srs_opt.robot import wpi_srs
 from virtual_lab.maps import steady_motion
@@ -18,6 +18,7 @@ from virtual_lab.truth import Truth
 
 FREQUENCIES_HZ = (1.0, 1.25, 1.5, 1.75, 2.0)
 PRESSURES_KPA = (41.0, 55.0)
+MARKS = ("o", "s")
 TRUTH = Truth(effects=({"name": "gap_length", "extra_m": 0.008},))
 
 
@@ -27,14 +28,17 @@ def draw(simulated: np.ndarray, measured: np.ndarray, factors: tuple[float, floa
     figure, panels = new_figure(1, 2, width_in=PAGE_IN, height_in=2.6)
     names = ("speed (m/s)", "radius (m)")
     for panel, model, runs, factor, name in zip(panels, simulated, measured, factors, names):
-        for pressure, line, dots, colour in zip(PRESSURES_KPA, model, runs, COLOURS):
-            panel.plot(FREQUENCIES_HZ, line, "--", color=colour, label=f"{pressure:g} kPa, model")
-            panel.plot(FREQUENCIES_HZ, factor * line, color=colour, label="calibrated")
-            panel.plot(FREQUENCIES_HZ, dots, "o", color=colour, markersize=4, label="generated runs")
+        for line, dots, colour, mark in zip(model, runs, COLOURS, MARKS):
+            panel.plot(FREQUENCIES_HZ, line, "--", color=colour)
+            panel.plot(FREQUENCIES_HZ, factor * line, color=colour)
+            panel.plot(FREQUENCIES_HZ, dots, mark, color=colour, markersize=4, linestyle="none")
         panel.set(
             xlabel="frequency (Hz)", ylabel=name, ylim=(0, None), title=f"offset 0.4, factor {factor:.3f}"
         )
-    panels[0].legend(fontsize=6)
+    keys = [line_key(f"{p:g} kPa", color=c, marker=m) for p, c, m in zip(PRESSURES_KPA, COLOURS, MARKS)]
+    keys += [line_key("model", linestyle="--"), line_key("model times factor")]
+    keys += [line_key("generated runs", linestyle="none", marker="o", markersize=4)]
+    figure.legend(handles=keys, loc="outside lower center", ncols=5)
     save_figure(figure, stem)
 
 

@@ -2,7 +2,10 @@
 
 from pathlib import Path
 
-from srs_opt.figures import COLOURS, LEFT, PAGE_IN, RIGHT, new_figure, save_figure, styled
+import matplotlib
+import numpy as np
+
+from srs_opt.figures import LEFT, PAGE_IN, RIGHT, SEQUENTIAL, line_key, new_figure, save_figure, styled
 from srs_opt.gait import Gait, published_wave
 from srs_opt.gait_opt.collocation.problem import CycleProblem
 from srs_opt.gait_opt.goal import Goal, Limits
@@ -12,7 +15,7 @@ from srs_opt.robot import wpi_srs
 
 
 def draw_valves(axes, gait: Gait) -> None:
-    """Draw a cycle of valves: a row per segment, S = +1 above its line."""
+    """Draw a cycle of valves: a row per segment."""
     durations, states = gait.phases()
     starts = durations.cumsum() - durations
     for row, valves in enumerate(states, start=1):
@@ -28,12 +31,15 @@ def draw(gaits: dict[str, Orbit], stem: Path) -> None:
     for (name, orbit), (valves, bend) in zip(gaits.items(), panels.T):
         draw_valves(valves, orbit.gait)
         valves.set_title(f"{name}: {orbit.speed_m_s:.3f} m/s at {orbit.gait.pressure_kpa:.0f} kPa")
-        for i, kappa in enumerate(orbit.kappa.T):
-            bend.plot(orbit.time_s, kappa, color=COLOURS[i], label=f"segment {i + 1}")
+        shades = matplotlib.colormaps[SEQUENTIAL](np.linspace(0, 0.9, orbit.gait.segments))
+        for i, (kappa, shade) in enumerate(zip(orbit.kappa.T, shades), start=1):
+            bend.plot(orbit.time_s, kappa, color=shade, label=f"segment {i}")
         bend.set(xlabel="time (s)", xlim=(0, orbit.gait.period_s))
-    panels[0, 0].set_ylabel("segment (tail = 1)\nblue: left, orange: right")
+    panels[0, 0].set_ylabel("segment (tail = 1)")
     panels[1, 0].set_ylabel("curvature (1/m)")
-    figure.legend(*panels[1, 1].get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    keys = [line_key(f"bends {side}", color=c, linewidth=6) for side, c in (("left", LEFT), ("right", RIGHT))]
+    keys += panels[1, 1].get_lines()
+    figure.legend(handles=keys, loc="outside lower center", ncols=len(keys))
     save_figure(figure, stem)
 
 

@@ -33,10 +33,12 @@ def draw(tests: tuple[StepTest, ...], fits: tuple[StepFit, ...], stem: Path) -> 
             s = (fit.tau1_s + fit.tau2_s) / 2
             q = ((fit.tau1_s - fit.tau2_s) / (2 * s)) ** 2
             panel.plot(test.time_s, test.curvature_1_m, ".", color=colour, markersize=2.5, alpha=0.6)
-            words = f"{test.condition}: {fit.c0_1_m:.1f} 1/m, {fit.tau1_s:.3f} s, {fit.tau2_s:.3f} s"
+            words = (
+                f"generated, {test.condition}: {fit.c0_1_m:.1f} 1/m, {fit.tau1_s:.3f} s, {fit.tau2_s:.3f} s"
+            )
             panel.plot(fine, fit.c0_1_m * step_response(fine, s, q), color=colour, label=words)
         panel.set(title=f"{pressure:g} kPa", xlabel="time (s)")
-        panel.legend(loc="lower right", title="fit of (14) to generated readings", title_fontsize=7)
+        panel.legend(loc="lower right", title="(14) fitted: C$_0$, τ$_1$, τ$_2$", title_fontsize=7)
     panels[0].set_ylabel(f"curvature of segment {SHOWN_SEGMENT} (1/m)")
     save_figure(figure, stem)
 
@@ -52,7 +54,7 @@ def main(out: Path = Path("out/examples")) -> float:
     for condition in ("lifted", "ground"):
         slope, tau = bench.slope(condition), bench.constants(condition)
         print(
-            f"{condition:7s} C0/p = {slope.value:.3f} ± {slope.sd:.3f} 1/m per kPa, "
+            f"{condition:7s} C0/p = {slope.value:.3f} +- {slope.sd:.3f} 1/m per kPa, "
             f"tau = {tau.tau1_s:.3f} and {tau.tau2_s:.3f} s"
         )
     return bench.slope("lifted").value / bench.slope("ground").value

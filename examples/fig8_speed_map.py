@@ -44,18 +44,20 @@ def draw(speed: dict[str, np.ndarray], error: np.ndarray, stem: Path) -> None:
     levels = np.linspace(-8, 8, 17)
     for panel, name in zip(panels[1, 1:], ("simplified model", MEASURED)):
         filled = panel.contourf(FREQUENCIES_HZ, PRESSURES_KPA, per_cent[name], levels, cmap="RdBu_r")
-        panel.set(
-            title=f"{name.split()[0]} over complex − 1", xlabel="frequency (Hz)", ylabel="pressure (kPa)"
-        )
+        panel.set(xlabel="frequency (Hz)", ylabel="pressure (kPa)")
+        panel.set_title(f"{name.split()[0]} over complex − 1")
     figure.colorbar(filled, ax=panels[1], label="difference (%)")
+    cut = panels[1, 0]
     for row, colour in ((0, COLOURS[0]), (-1, COLOURS[1])):
-        cut, pressure = panels[1, 0], f"{PRESSURES_KPA[row]:g} kPa"
-        cut.plot(FREQUENCIES_HZ, speed["complex model"][row], color=colour, label=f"{pressure}, complex")
-        cut.plot(FREQUENCIES_HZ, speed["simplified model"][row], "--", color=colour, label="simplified")
+        style = {"color": colour, "label": f"{PRESSURES_KPA[row]:g} kPa"}
+        cut.plot(FREQUENCIES_HZ, speed["complex model"][row], **style)
+        cut.plot(FREQUENCIES_HZ, speed["simplified model"][row], "--", color=colour)
         dots = (FREQUENCIES_HZ, speed[MEASURED][row], 2 * error[row])
-        cut.errorbar(*dots, fmt="o", color=colour, markersize=3, clip_on=False, label="generated, ± 2 sd")
+        cut.errorbar(*dots, fmt="o", color=colour, markersize=3, clip_on=False)
+    for style, name in (("k-", "complex"), ("k--", "simplified"), ("ko", "generated ± 2 sd")):
+        cut.plot([], [], style, markersize=3, label=name)
     cut.set(xlabel="frequency (Hz)", ylabel="speed (m/s)", ylim=(0, None))
-    cut.legend(fontsize=6)
+    cut.legend(loc="lower right", fontsize=6)
     save_figure(figure, stem)
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from srs_opt.figures import COLOURS, PAGE_IN, new_figure, save_figure, styled
+from srs_opt.figures import COLOURS, PAGE_IN, line_key, new_figure, save_figure, styled
 from srs_opt.gait_map.grid import gait_map, grid_points
 from srs_opt.measurement.dataset import load_dataset
 from srs_opt.robot import Robot, wpi_srs
@@ -43,17 +43,20 @@ def draw(found: dict[str, np.ndarray], stem: Path) -> None:
     figure, panels = new_figure(2, 2, width_in=PAGE_IN, height_in=4.4, sharex=True)
     for q, name in enumerate(("speed (m/s)", "radius (m)")):
         value, difference = panels[:, q]
-        for k, (pressure, colour) in enumerate(zip(PRESSURES_KPA, COLOURS)):
+        for k, colour in zip(range(len(PRESSURES_KPA)), COLOURS):
             base = found["complex"][q, k]
-            value.plot(FREQUENCIES_HZ, base, color=colour, label=f"{pressure:g} kPa, complex")
+            value.plot(FREQUENCIES_HZ, base, color=colour)
             for other, line in STYLES.items():
                 style = {"color": colour, "markersize": 4}
-                value.plot(FREQUENCIES_HZ, found[other][q, k], line, label=other, **style)
+                value.plot(FREQUENCIES_HZ, found[other][q, k], line, **style)
                 difference.plot(FREQUENCIES_HZ, 100 * (found[other][q, k] / base - 1), line, **style)
         difference.axhline(0, color="black", linewidth=0.6)
         value.set(ylabel=name, ylim=(0, None))
         difference.set(xlabel="frequency (Hz)", ylabel=f"{name.split()[0]} over complex − 1 (%)")
-    panels[0, 1].legend(ncols=2, loc="lower center")
+    keys = [line_key(f"{p:g} kPa", color=colour) for p, colour in zip(PRESSURES_KPA, COLOURS)]
+    for name, line in {"complex": "-", **STYLES}.items():
+        keys += panels[0, 0].plot([], [], line, color="black", markersize=4, label=name)
+    figure.legend(handles=keys, loc="outside lower center", ncols=6)
     save_figure(figure, stem)
 
 

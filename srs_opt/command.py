@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import re
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
@@ -34,6 +35,13 @@ class Answer:
 
 class Parser(argparse.ArgumentParser):
     """An argument parser whose complaints are one line."""
+
+    out_may_be_a_file = False  # whether --out may name the answer's file, which may exist
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        # argparse before Python 3.14 takes -5e-2 for an option
+        self._negative_number_matcher = re.compile(r"^-(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?$")
 
     def error(self, message: str) -> NoReturn:
         """Report bad usage on one line and exit with status 2."""
@@ -89,11 +97,12 @@ def run_command(
 
     No traceback reaches a user; with SRS_OPT_TRACEBACK set, that of a bug does.
     """
+    _ready_streams()
     options = parser.parse_args(argv)
     try:
         if options.out is None:
             options.out = Path("out") / parser.prog.split()[-1].split(".")[-1]
-        check_can_write(options.out)
+        check_can_write(options.out, or_file=parser.out_may_be_a_file)
         answer = run(options)
         if options.json:
             print(json.dumps(answer.record, allow_nan=False))
@@ -121,6 +130,13 @@ def run_command(
         _close_output()
         print(f"{parser.prog}: {error.filename or 'output'}: {error.strerror or error}", file=sys.stderr)
         return 2
+    except MemoryError as error:
+        print(
+            f"{parser.prog}: not enough memory for what was asked ({one_line(error) or 'no detail'}); "
+            "ask for less: shorter, fewer or coarser",
+            file=sys.stderr,
+        )
+        return 2
     except Exception as error:
         if os.environ.get("SRS_OPT_TRACEBACK"):
             raise
@@ -130,6 +146,16 @@ def run_command(
             file=sys.stderr,
         )
         return FAULT
+
+
+def _ready_streams() -> None:
+    """Make sure that words can be printed: streams closed at the start, or without some character."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115  # as long as we run
+        elif hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")  # a name in another alphabet is no reason to fail
 
 
 def _close_output() -> None:

@@ -200,6 +200,8 @@ def violations(document: Document, schema: dict[str, Any]) -> list[InputError]:
     """Return everything in `document` that breaks `schema`, the most telling first."""
     import jsonschema
 
+    if document.value is None:
+        return [document.error((), f"is empty (expected {_TYPES.get(schema.get('type', ''), 'content')})")]
     bad = list(islice(_not_finite(document.value, ()), MOST_VIOLATIONS))
     found = [document.error(place, "must be a finite number") for place in bad]
     validator = jsonschema.Draft202012Validator(schema)

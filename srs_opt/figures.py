@@ -12,6 +12,7 @@ from srs_opt.files import atomic_path
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
 
 # Okabe and Ito's palette: distinguishable with any colour vision
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#999999")
@@ -79,15 +80,31 @@ def save_figure(figure: Figure, stem: Path | str, *, dpi: int = 200) -> tuple[Pa
     return targets
 
 
+def line_key(label: str, **style: Any) -> Line2D:
+    """Return a legend's entry for a style that several lines share, such as one colour per pressure."""
+    from matplotlib.lines import Line2D
+
+    return Line2D([], [], **{"color": "black", **style}, label=label)
+
+
 def draw_body(axes: Axes, x: Any, y: Any, width_m: float, **style: Any) -> None:
     """Draw a body as the capsule of `width_m` along the centre line (x, y), in data units."""
+    import shapely
+
+    shape = shapely.LineString(list(zip(x, y))).buffer(width_m / 2, quad_segs=8)
+    fill_region(axes, shape, **{"alpha": 0.6, **style})
+
+
+def fill_region(axes: Axes, region: Any, **style: Any) -> None:
+    """Fill a shapely region in data units; its holes stay open."""
     import shapely
     from matplotlib.patches import PathPatch
     from matplotlib.path import Path as Outline
 
-    shape = shapely.LineString(list(zip(x, y))).buffer(width_m / 2, quad_segs=8)
-    rings = [shape.exterior, *shape.interiors]
-    outline = Outline.make_compound_path(*[Outline(ring.coords, closed=True) for ring in rings])
-    axes.add_patch(PathPatch(outline, **{"linewidth": 0, "alpha": 0.6, **style}))
-    axes.update_datalim([shape.bounds[:2], shape.bounds[2:]])
+    parts = [part for part in shapely.get_parts(region) if part.geom_type == "Polygon"]
+    rings = [Outline(ring.coords, closed=True) for p in parts for ring in (p.exterior, *p.interiors)]
+    if not rings:
+        return
+    axes.add_patch(PathPatch(Outline.make_compound_path(*rings), **{"linewidth": 0, **style}))
+    axes.update_datalim([region.bounds[:2], region.bounds[2:]])
     axes.autoscale_view()

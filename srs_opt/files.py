@@ -44,19 +44,28 @@ def _explained(target: Path) -> Iterator[None]:
         raise InputError(f"{target}: cannot write: {reason}; choose another folder with --out") from error
 
 
-def check_can_write(folder: Path) -> None:
+def check_can_write(folder: Path, *, or_file: bool = False) -> None:
     """Complain before long work rather than after it.
+
+    Parameters
+    ----------
+    folder : Path
+        Where files will be made.
+    or_file : bool
+        Whether `folder` may instead be the name of one file, which may exist.
 
     Raises
     ------
     InputError
         If files cannot be made in `folder`, or, when it does not exist yet, where it would be made.
     """
-    place = folder
-    while not place.exists():
-        place = place.parent
-    if place != folder or place.is_dir():  # a file called `folder` may be meant as the answer's name
-        with _explained(folder), tempfile.TemporaryFile(dir=place):
+    with _explained(folder):
+        place = folder
+        while not place.exists():
+            place = place.parent
+        if or_file and place == folder and place.is_file():
+            return
+        with tempfile.TemporaryFile(dir=place):
             pass
 
 

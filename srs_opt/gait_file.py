@@ -36,7 +36,10 @@ def load_gait(path: str, pressure_kpa: float) -> Gait:
     document = parse_yaml(text, file, "a gait (JSON)")
     record = document.value
     if not isinstance(record, dict):
-        raise InputError(f"{file}: expected a mapping with keys frequency_hz, pressure_kpa, switches")
+        found = "is empty" if record is None else "is no gait"
+        raise InputError(
+            f"{file}: {found} (expected a mapping with keys frequency_hz, pressure_kpa, switches)"
+        )
     if "gaits" in record:
         return _from_table(file, name)
     return _from_result(document)

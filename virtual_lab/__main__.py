@@ -14,6 +14,8 @@ from typing import NoReturn
 from virtual_lab.errors import LabError
 
 PROG = "python -m virtual_lab"
+# sizes beyond which nothing snake-like is left to simulate, or a data set fills the computer
+MOST = {"scale": 20.0, "bench_error": 5.0, "duration": 600.0, "rate": 1e4, "noise": 1.0, "stated_noise": 1.0}
 
 
 class _Parser(argparse.ArgumentParser):
@@ -120,6 +122,10 @@ def make(options: argparse.Namespace) -> dict[str, object]:
     from virtual_lab.trials import design
     from virtual_lab.truth import Scatter
 
+    for name, most in MOST.items():
+        value = getattr(options, name)
+        if value is not None and value > most:
+            raise LabError(f"--{name.replace('_', '-')}: expected at most {most:g}, found {value:g}")
     if options.seed < 0:
         raise LabError(f"--seed must not be below 0, found {options.seed}")
     start = time.perf_counter()
@@ -159,6 +165,8 @@ def main(argv: list[str] | None = None) -> int:
     try:
         if options.list:
             _list(options)
+            if sys.stdout is not None:
+                sys.stdout.flush()
             return 0
         answer = make(options)
         if options.json:
@@ -166,22 +174,23 @@ def main(argv: list[str] | None = None) -> int:
         elif not options.quiet:
             print(f"{answer['trials']} trials in {answer['seconds']} s")
             print(f"  wrote {answer['dataset']}\n  wrote {answer['truth']}")
-        sys.stdout.flush()
+        if sys.stdout is not None:  # closed by whoever started this
+            sys.stdout.flush()
     except LabError as error:
         print(f"{PROG}: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
     except ModuleNotFoundError as error:
         print(f"{PROG}: needs {error.name}; install the project with its dev extra", file=sys.stderr)
         return 2
-    except OSError as error:
-        print(f"{PROG}: {error.filename}: {error.strerror}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print(f"\n{PROG}: interrupted", file=sys.stderr)
-        return 130
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 141
+    except OSError as error:
+        print(f"{PROG}: {error.filename or 'output'}: {error.strerror or error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print(f"\n{PROG}: interrupted; nothing half-written was left behind", file=sys.stderr)
+        return 130
     return 0
 
 

@@ -30,6 +30,8 @@ _TRIAL_COLUMNS = (
     "duration_s",
 )
 
+MAX_RATE_HZ = 1e5
+
 
 @dataclass(frozen=True)
 class Recording:
@@ -74,6 +76,8 @@ class Recording:
                 "expected rate_hz above 0, marker_sd_m not below 0, lost 0 to 1, replicates from 1; found "
                 f"{self.rate_hz:g}, {self.marker_sd_m:g}, {self.lost:g}, {self.replicates}"
             )
+        if self.rate_hz > MAX_RATE_HZ:
+            raise LabError(f"expected a camera rate of at most {MAX_RATE_HZ:g} Hz, found {self.rate_hz:g}")
         if not (self.tracks or self.maps):
             raise LabError("a data set holds trials or maps; ask for one of them")
 

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 STYLES = ("perfect", "braided", "rooms", "corridor")
 MAX_CELLS = 200
+MIN_M, MAX_M = 0.001, 100.0  # of a cell, and of a corridor
 
 
 def build_parser() -> Parser:
@@ -26,6 +27,7 @@ def build_parser() -> Parser:
         "python -m planners.generate --style braided --cells 16 --cell 0.36 --seed 3 --out mazes/b3.yaml",
         robot=False,
     )
+    parser.out_may_be_a_file = True
     parser.add_argument("--style", choices=STYLES, default="perfect", help="kind of maze (default perfect)")
     parser.add_argument(
         "--cells", type=positive_int, default=16, metavar="N", help="cells a side (default 16)"
@@ -101,6 +103,10 @@ def run(options: argparse.Namespace) -> Answer:
 def _check(options: argparse.Namespace) -> None:
     if not 4 <= options.cells <= MAX_CELLS:
         raise InputError(f"--cells: expected 4 to {MAX_CELLS}, found {options.cells}")
+    for name in ("cell", "length"):
+        value = getattr(options, name)
+        if not MIN_M <= value <= MAX_M:
+            raise InputError(f"--{name}: expected {MIN_M:g} to {MAX_M:g} m, found {value:g}")
     if not 0 <= options.braid <= 1:
         raise InputError(f"--braid: expected a share from 0 to 1, found {options.braid}")
     options.wall = options.wall or options.cell * 12 / 180

@@ -8,7 +8,7 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from srs_opt.document import load_schema, read_json, validate
+from srs_opt.document import Document, load_schema, read_json, validate
 from srs_opt.errors import InputError
 from srs_opt.files import write_text
 
@@ -43,7 +43,26 @@ def read_motion(file: Path) -> dict[str, Any]:
     document = read_json(file, "a motion (JSON of the command plan)")
     validate(document, load_schema("planners.view", "motion.schema.json"))
     record: dict[str, Any] = document.value
+    for index, run in enumerate(record["runs"]):
+        _check_run(document, ("runs", index), run, len(record["gaits"]))
     return record
+
+
+def _check_run(document: Document, place: tuple[str | int, ...], run: dict[str, Any], gaits: int) -> None:
+    """Complain of what a schema cannot see and the page would trip over."""
+    if not run["cycles"]:
+        raise document.error((*place, "cycles"), "is empty (expected [gait, start] of every cycle)")
+    for index, cycle in enumerate(run["cycles"]):
+        if not (isinstance(cycle, list) and len(cycle) == 2 and cycle[0] in range(gaits)):
+            raise document.error(
+                (*place, "cycles", index),
+                f"expected [index below {gaits} into gaits, start in s], found {cycle}",
+            )
+    for key in ("body", "clearance_mm"):
+        if len(run[key]) != len(run["centre"]):
+            raise document.error(
+                (*place, key), f"has {len(run[key])} instants where centre has {len(run['centre'])}"
+            )
 
 
 def save_page(motion: dict[str, Any], path: Path) -> Path:

@@ -112,7 +112,13 @@ def _maze(maze: Maze) -> dict[str, Any]:
         "cells": _cells(maze),
         "start": start and [start.x, start.y, start.heading],
         "goal": goal
-        and {"x": goal.x, "y": goal.y, "radius": goal.radius, "boxes": [list(b) for b in goal.boxes]},
+        and {
+            "x": goal.x,
+            "y": goal.y,
+            "radius": goal.radius,
+            "boxes": [list(b) for b in goal.boxes],
+            "heading": goal.heading,
+        },
     }
 
 

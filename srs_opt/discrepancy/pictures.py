@@ -12,9 +12,12 @@ import numpy as np
 from srs_opt.discrepancy.locate import misfit_by_trial
 from srs_opt.discrepancy.pipeline import Discrepancy
 from srs_opt.discrepancy.seal import sealed_residuals
+from srs_opt.figures import COLOURS, PAGE_IN, styled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+AFTER, BEFORE = COLOURS[:2]
 
 
 @dataclass(frozen=True)
@@ -26,6 +29,7 @@ class Picture:
     png: str
 
 
+@styled
 def pictures(found: Discrepancy) -> list[Picture]:
     """Return the pictures that the result allows."""
     if found.null is None or found.best is None or found.experiment is None or found.selection is None:
@@ -39,7 +43,7 @@ def pictures(found: Discrepancy) -> list[Picture]:
 def _figure(width: float, height: float) -> Figure:
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(width, height), dpi=110, layout="constrained")
+    figure = Figure(figsize=(width, height), dpi=150, layout="constrained")
     return figure
 
 
@@ -52,22 +56,22 @@ def _encoded(figure: Figure, title: str, caption: str) -> Picture:
 def _sealed(found: Discrepancy) -> Picture:
     """Draw the smoothed residual over time on the sealed trials, before and after."""
     assert found.experiment is not None and found.null is not None and found.selection is not None
-    trials = found.split.sealed[:4]
+    trials = sorted(found.split.sealed[:4], key=lambda trial: trial.name)
     fits = [found.null.hypothesis.fit, found.selection.best.fit]
-    figure = _figure(8, 1.0 + 1.5 * len(trials))
+    figure = _figure(PAGE_IN, 0.9 + 1.2 * len(trials))
     axes = figure.subplots(len(trials), 1, sharex=True, squeeze=False)[:, 0]
     labels = ("calibration alone", "with the effect")
-    colours = ("tab:red", "tab:blue")
+    colours = (BEFORE, AFTER)
     shown = 2 if found.selection.best.candidates else 1
     for fit, label, colour in list(zip(fits, labels, colours))[:shown]:
         for axis, trial, residual in zip(axes, trials, sealed_residuals(found.experiment, fit, trials)):
             axis.plot(trial.time_s, 1e3 * _rolling(residual), color=colour, label=label, lw=1.3)
-            axis.set_ylabel(f"{trial.name}\nmm")
+            axis.set_ylabel(f"{trial.name}\n(mm)")
     for axis in axes:
         axis.axhline(1e3 * found.sd_m, color="k", lw=0.8, ls="--", label="noise floor")
         axis.set_ylim(bottom=0)
-    axes[0].legend(loc="upper left", ncols=3, fontsize=8)
-    axes[-1].set_xlabel("time, s")
+    axes[0].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3)
+    axes[-1].set_xlabel("time (s)")
     return _encoded(
         figure,
         "The gap on sealed trials",
@@ -93,16 +97,13 @@ def _candidates(found: Discrepancy) -> Picture:
         gain = score.improvement * found.null.linearisation.temper
         best.setdefault(score.candidate.effect, max(gain, 0.0))
     names = list(best)[::-1]
-    figure = _figure(8, 0.5 + 0.22 * len(names))
+    figure = _figure(PAGE_IN, 0.5 + 0.17 * len(names))
     axis = figure.subplots()
     chosen = found.selection.best.names if found.selection else ()
-    axis.barh(
-        names, [best[n] + 0.1 for n in names], color=["tab:blue" if n in chosen else "0.7" for n in names]
-    )
+    axis.barh(names, [best[n] + 0.1 for n in names], color=[AFTER if n in chosen else "0.7" for n in names])
     axis.axvline(20, color="k", ls="--", lw=0.8)
     axis.set_xscale("log")
     axis.set_xlabel("expected gain (drop of the deviance); dashed: about what chance gives the best of all")
-    axis.tick_params(labelsize=8)
     return _encoded(
         figure,
         "What each effect would explain",
@@ -112,18 +113,20 @@ def _candidates(found: Discrepancy) -> Picture:
 
 def _trials(found: Discrepancy) -> Picture:
     """Draw the misfit of every open trial, before and after."""
+    from matplotlib.ticker import LogFormatter
+
     assert found.null is not None and found.best is not None
     before, after = misfit_by_trial(found.null), misfit_by_trial(found.best)
     names = [t.name for t in found.split.open]
     place = np.arange(len(names))
-    figure = _figure(8, 2.6)
+    figure = _figure(PAGE_IN, 2.4)
     axis = figure.subplots()
-    axis.semilogy(place, [before[n] for n in names], "o", color="tab:red", label="calibration alone")
-    axis.semilogy(
-        place, [after[n] for n in names], "s", mfc="none", color="tab:blue", label="best set of effects"
-    )
+    axis.semilogy(place, [before[n] for n in names], "o", color=BEFORE, label="calibration alone")
+    axis.semilogy(place, [after[n] for n in names], "s", mfc="none", color=AFTER, label="best set of effects")
     axis.axhline(1, color="k", ls="--", lw=0.8)
-    axis.set_xticks(place, names, rotation=60, fontsize=8)
+    axis.set_xticks(place, names, rotation=60)
     axis.set_ylabel("misfit / noise variance")
-    axis.legend(fontsize=8)
+    axis.yaxis.set_major_formatter(LogFormatter())
+    axis.yaxis.set_minor_formatter(LogFormatter())
+    axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
     return _encoded(figure, "Every open trial", "1 is what noise alone leaves.")

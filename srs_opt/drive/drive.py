@@ -20,6 +20,7 @@ from srs_opt.orbit.steady import Orbit, steady_gait
 from srs_opt.robot import Robot
 
 LEVER_M = 0.1  # weighs turn rates against speeds when distances between motions are taken
+MOST_M_S, MOST_RAD_S = 100.0, 1000.0  # far beyond any snake; geometry with 1e308 overflows
 _REFINEMENTS = 3
 
 
@@ -80,9 +81,16 @@ class Drive:
 
         Raises
         ------
+        InputError
+            For numbers that no robot moves with, or none.
         OutOfReachError
             Outside the reachable set; the message names the nearest reachable motion.
         """
+        if not (abs(speed_m_s) <= MOST_M_S and abs(turn_rate_rad_s) <= MOST_RAD_S):
+            raise InputError(
+                f"expected a speed of at most {MOST_M_S:g} m/s and a turn rate of at most {MOST_RAD_S:g} "
+                f"rad/s, found {speed_m_s:g} m/s turning {turn_rate_rad_s:+g} rad/s"
+            )
         reverse = speed_m_s < 0
         speed, turn = abs(speed_m_s), turn_rate_rad_s * (-1 if reverse else 1)
         side = -1.0 if turn < 0 else 1.0

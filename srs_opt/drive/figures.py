@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import shapely
+import shapely.affinity
 
 from srs_opt.drive.drive import Drive, DriveGait
-from srs_opt.figures import COLOURS, new_figure, save_figure, styled
+from srs_opt.figures import COLOURS, fill_region, new_figure, save_figure, styled
 
 
 @styled
@@ -16,11 +16,9 @@ def draw_reachable(drive: Drive, stem: Path, chosen: DriveGait | None = None) ->
     """Draw the reachable set of speed and turn rate, forward and reverse; return the files."""
     figure, axes = new_figure(width_in=3.5, height_in=2.8)
     reachable = drive.reachable()
-    parts = shapely.get_parts(reachable)
     for sign, colour, label in ((1, COLOURS[0], "forward"), (-1, COLOURS[1], "reverse")):
-        for k, part in enumerate(parts):
-            x, y = np.asarray(part.exterior.coords).T
-            axes.fill(sign * x, y, color=colour, alpha=0.35, linewidth=0, label=label if k == 0 else None)
+        side = shapely.affinity.scale(reachable, sign, 1, origin=(0, 0))
+        fill_region(axes, side, color=colour, alpha=0.35, label=label)
     grid = drive.corners[:, :, 4:6].reshape(-1, 2)
     axes.plot(grid[:, 0], grid[:, 1], ".", color=COLOURS[6], markersize=1.5, label="gaits of the map")
     if chosen is not None:

@@ -59,12 +59,13 @@ def _contours(axes: Axes, part: GaitMap, values: np.ndarray, label: str) -> None
     rows = np.searchsorted(pressure, part.column("pressure_kpa"))
     table[rows, np.searchsorted(frequency, part.column("frequency_hz"))] = values
     if not np.isfinite(table).any():
-        axes.text(0.5, 0.5, "straight", transform=axes.transAxes, ha="center")
+        axes.text(0.5, 0.5, "straight:\nno radius", transform=axes.transAxes, ha="center")
         axes.set_axis_off()
         return
     axes.set_xlabel("frequency (Hz)")
     axes.set_ylabel("pressure (kPa)")
     filled = axes.contourf(frequency, pressure, table, 12, cmap=SEQUENTIAL)
-    lines = axes.contour(frequency, pressure, table, 6, colors="white", linewidths=0.5)
-    axes.clabel(lines, fontsize=6)
-    axes.figure.colorbar(filled, ax=axes, label=label)
+    shown = np.asarray(filled.levels)[::2]
+    lines = axes.contour(frequency, pressure, table, shown, colors="white", linewidths=0.5)
+    bar = axes.figure.colorbar(filled, ax=axes, label=label, ticks=shown)
+    bar.add_lines(lines)  # labels within the map would be cut off at its edges

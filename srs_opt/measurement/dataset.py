@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import shlex
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import IO
@@ -57,7 +58,7 @@ def load_dataset(folder: Path | str) -> DataSet:
         first = errors[0]
         place = f"{first.file}:{first.line}" if first.line else first.file
         more = (
-            f" (and {len(errors) - 1} more: python -m srs_opt.measurement {folder})"
+            f" (and {len(errors) - 1} more: python -m srs_opt.measurement {shlex.quote(str(folder))})"
             if len(errors) > 1
             else ""
         )

@@ -34,7 +34,7 @@ def step_figure(tests: Sequence[StepTest], fits: Sequence[StepFit]) -> Figure:
         label = None if test.condition in named else f"{test.condition}, (14) fitted"
         axes.plot(fine, fit.c0_1_m * step_response(fine - fit.delay_s, s, q), color=colour, label=label)
         named.add(test.condition)
-    axes.set(xlabel="time (s)", ylabel="curvature (1/m)", title="Step responses")
+    axes.set(xlabel="time (s)", ylabel="curvature (1/m)", title="step responses")
     axes.legend()
     return figure
 
@@ -48,7 +48,7 @@ def circle_figure(centre_track_m: Array, circle: Circle) -> Figure:
     axes.plot(centre_track_m[:, 0], centre_track_m[:, 1], ".", color=TRACK, markersize=2, label="track")
     label = f"circle, radius {radius:.4f} ± {circle.radius_sd_m:.4f} m"
     axes.plot(x + radius * np.cos(angle), y + radius * np.sin(angle), color=FIT, label=label)
-    axes.set(xlabel="x (m)", ylabel="y (m)", aspect="equal", title="Trajectory and circle fit")
+    axes.set(xlabel="x (m)", ylabel="y (m)", aspect="equal", title="trajectory and circle fit")
     axes.legend()
     return figure
 
@@ -65,7 +65,7 @@ def shape_figure(shape: SmoothShape, level_sds: float = 1.645) -> Figure:
         axes.fill_between(shape.time_s, low, high, alpha=0.3, linewidth=0)
         axes.plot(shape.time_s, middle)
         axes.set(ylabel=f"segment {number + 1}\n(1/m)")
-    rows[0].set(title="Curvature, smoothed")
+    rows[0].set(title="curvature, smoothed")
     rows[-1].set(xlabel="time (s)")
     return figure
 
@@ -84,5 +84,5 @@ def track_figure(trial: Trial, every_s: float = 0.5) -> Figure:
             axes.plot(*frame[-1], "o", color=TRACK, markersize=3)
     elif trial.centre_m is not None:
         axes.plot(*trial.centre_m.T, ".", markersize=2)
-    axes.set(xlabel="x (m)", ylabel="y (m)", aspect="equal", title=f"Trial {trial.name} (head: dot)")
+    axes.set(xlabel="x (m)", ylabel="y (m)", aspect="equal", title=f"trial {trial.name} (dot: head)")
     return figure

@@ -44,7 +44,7 @@ class Row:
             return default
         value = to_number(text)
         if value is None or not math.isfinite(value):
-            found = repr(text[:40]) if text else "an empty cell"
+            found = f"'{text[:40]}'" if text else "an empty cell"
             report.error(self.file, self.line, f"{column}: expected a number, found {found}")
             return math.nan
         return value
@@ -200,10 +200,8 @@ def _faulty_numbers(file: str, report: Report) -> NumberTable | None:
         row = [to_number(cell) for cell in cells]
         for name, cell, value in zip(header, cells, row):
             if value is None or math.isinf(value):
-                text = repr(cell.strip()[:40])
-                report.error(
-                    file, number, f"{name[:40]}: expected a number or an empty cell, found {text[:40]!r}"
-                )
+                text = cell.strip()[:40]
+                report.error(file, number, f"{name[:40]}: expected a number or an empty cell, found '{text}'")
         rows.append([math.nan if v is None or math.isinf(v) else v for v in row])
         numbers.append(number)
     if not rows:

@@ -14,6 +14,7 @@ from srs_opt.measurement.table import NumberTable, read_numbers
 from srs_opt.robot import Robot
 
 MAX_MISSING_ROWS = 5
+FARTHEST_M = 1e5  # from the origin; a fit to 1e308 m ends in not-a-number, not in an answer
 TOP_SPEED_LENGTHS_PER_S = 25.0
 
 
@@ -48,6 +49,16 @@ def read_track(file: str, markers: str, links: int, report: Report) -> Track | N
     time = table.values[:, 0]
     points = np.ascontiguousarray(table.values[:, 1:].reshape(len(time), -1, 2))
     points, time = points.copy(), time.copy()
+    far = np.argwhere(np.abs(points) > FARTHEST_M)
+    if far.size:
+        frame, marker, axis = far[0]
+        report.error(
+            file,
+            table.lines[frame],
+            f"marker {marker + 1} stands {points[frame, marker, axis]:.3g} m from the origin "
+            f"(expected at most {FARTHEST_M:g} m; are these millimetres?)",
+        )
+        points[(np.abs(points) > FARTHEST_M).any(axis=2)] = np.nan  # the other checks would overflow
     half = np.isnan(points).any(axis=2) & ~np.isnan(points).all(axis=2)
     if half.any():
         frame, marker = np.argwhere(half)[0]
@@ -101,7 +112,7 @@ def check_track(
 def _check_clock(trial: Trial, track: Track, rate_hz: float, report: Report) -> bool:
     time, file, lines = track.time_s, track.file, track.lines
     for row in np.flatnonzero(np.isnan(time)):
-        report.error(file, lines[row], "time_s: expected a number, found an empty cell")
+        report.error(file, lines[row], "time_s: expected a number, found an empty cell or nan")
     if np.isnan(time).any():
         return False
     if len(time) < 2:

@@ -234,7 +234,7 @@ def _settled(cycle: _Cycle, mesh: Mesh, tolerance: float) -> Search[tuple[np.nda
             lapped = yield from cycle.plain_lap(velocity, mesh)
             if not np.isfinite(lapped.states[:, -1]).all():
                 raise cycle.no_answer(
-                    "the motion stops being finite; check masses, time constants and effect sizes"
+                    "the motion stops being finite; check pressure, masses, time constants and effect sizes"
                 )
             if lapped.error_m_s.max() <= LOOSE * tolerance:
                 break

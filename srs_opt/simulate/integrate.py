@@ -172,7 +172,8 @@ class Integrator:
             bad = int(np.argmax(~np.isfinite(got.states).all(axis=0)))
             raise NoAnswerError(
                 f"the simulated motion of robot '{self.robot.name}' stops being finite "
-                f"{mesh.h_s[:bad].sum():.3g} s into a cycle: check masses, time constants and effect sizes"
+                f"{mesh.h_s[:bad].sum():.3g} s into a cycle: "
+                "check pressure, masses, time constants and effect sizes"
             )
         return got.states, got.error_m_s
 

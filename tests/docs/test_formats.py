@@ -57,5 +57,27 @@ def test_every_effect_is_documented():
         assert [p.name for p in effect.parameters if f"`{p.name}`" not in row] == []
 
 
+def test_every_key_of_a_plan_is_documented(tmp_path):
+    from planners.plan.__main__ import main as plan
+
+    for maze, status in (("u_turn", 0), ("no_way", 1)):
+        folder = tmp_path / maze
+        given = [str(ROOT / f"mazes/{maze}.yaml"), "--execute", "--quiet", "--out", str(folder)]
+        assert plan(given) == status
+        record = json.loads((folder / "plan.json").read_text(encoding="utf-8"))
+        names = {*record, *record.get("execution", {}), *(record.get("tightest") or {})}
+        names |= {key for row in (*record["steps"][:1], *record["path"][:1]) for key in row}
+        assert not {name for name in names if f"`{name}`" not in PAGE}
+
+
+def test_every_command_is_listed():
+    page = (ROOT / "docs" / "commands.md").read_text(encoding="utf-8")
+    folders = [
+        path.parent for package in ("srs_opt", "planners") for path in (ROOT / package).rglob("__main__.py")
+    ]
+    names = [".".join(folder.relative_to(ROOT).parts) for folder in folders]
+    assert not [name for name in names if f"python -m {name}" not in page and name != "planners.plan"]
+
+
 def test_every_maze_ending_is_documented():
     assert not [ending for ending in ENDINGS if ending != ".json" and ending not in PAGE and ending != ".yml"]

@@ -10,6 +10,16 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 NOT_COMMANDS = {"planners.tour"}
 
+RUN = {
+    "name": "planned", "duration_s": 1, "cycles": [[0, 0]], "centre": [[0, 0], [1, 0]],
+    "body": [[0, 0, 1, 0], [1, 0, 2, 0]], "clearance_mm": [50, 50],
+}  # fmt: skip
+MOTION = {
+    "version": 1, "robot": "x", "body_width_m": 0.04, "margin_m": 0.005, "runs": [RUN],
+    "maze": {"name": "x", "bounds": [0, 0, 1, 1], "rings": [], "cells": None, "start": None, "goal": None},
+    "gaits": [{"name": "x", "period_s": 1, "pressure_kpa": 50, "intervals": [[[0, 0.5]]]}],
+}  # fmt: skip
+
 # command, arguments, exit status, what the one line must say ({tmp} is a fresh folder with the files below)
 FILES = {
     "typo.yaml": "lenght: 3\n",
@@ -38,6 +48,11 @@ FILES = {
     "camera: {rate_hz: 100, marker_sd_m: 0.001}\n",
     "take.csv": "Format Version,1.23\n",
     "trials.csv": "trial,frequency_hz\na,1\n",
+    "empty.yaml": "",
+    "no_gaits/motion.json": json.dumps(MOTION | {"gaits": []}),
+    "cycle/motion.json": json.dumps(MOTION | {"runs": [RUN | {"cycles": [[7, 0]]}]}),
+    "still/motion.json": json.dumps(MOTION | {"runs": [RUN | {"cycles": []}]}),
+    "short/motion.json": json.dumps(MOTION | {"runs": [RUN | {"clearance_mm": [1, 2, 3]}]}),
 }
 CASES = [
     ("srs_opt.simulate", ["--frequency", "fast"], 2, "expected a finite number"),
@@ -63,6 +78,9 @@ CASES = [
     ("srs_opt.simulate", ["--gait", "{tmp}/gait.json"], 2, "missing"),
     ("srs_opt.simulate", ["--gait", "{tmp}/table.json"], 2, "table.json"),
     ("srs_opt.simulate", ["--gait", "{tmp}/old_table.json:x"], 2, "version"),
+    ("srs_opt.simulate", ["--robot", "{tmp}/empty.yaml"], 2, "empty.yaml: is empty"),
+    ("srs_opt.simulate", ["--gait", "{tmp}/empty.yaml"], 2, "empty.yaml: is empty"),
+    ("srs_opt.simulate", ["--pressure", "1e308"], 1, "check pressure"),
     ("srs_opt.gait_map", ["--frequency", "2", "1", "3"], 2, "LO <= HI"),
     ("srs_opt.gait_map", ["--frequency", "1", "2"], 2, "expected 3 arguments"),
     ("srs_opt.gait_map", ["--offset", "1.5"], 2, "between -1 and 1"),
@@ -72,6 +90,8 @@ CASES = [
     ("srs_opt.drive", [], 2, "--speed"),
     ("srs_opt.drive", ["--speed", "0.1", "--radius", "1", "--turn-rate", "1"], 2, "not both"),
     ("srs_opt.drive", ["--speed", "nan"], 2, "expected a finite number"),
+    ("srs_opt.drive", ["--speed", "1e308", "--quiet"], 2, "at most 100 m/s"),
+    ("srs_opt.drive", ["--speed", "0.1", "--turn-rate", "-1e308", "--quiet"], 2, "at most 1000 rad/s"),
     ("srs_opt.drive", ["--speed", "0.1", "--map", "{tmp}/map.csv"], 2, "map.csv:1: expected the columns"),
     ("srs_opt.measurement", ["{tmp}/absent", "--quiet"], 2, "absent"),
     ("srs_opt.measurement", ["{tmp}/set", "--quiet"], 2, "dataset.yaml"),
@@ -115,9 +135,20 @@ CASES = [
     ("planners.generate", ["--cells", "1"], 2, "4 to 200"),
     ("planners.generate", ["--style", "rooms", "--format", "txt"], 2, "write rooms as yaml"),
     ("planners.generate", ["--wall", "99"], 2, "too thick"),
+    ("planners.generate", ["--cell", "1e-300"], 2, "expected 0.001 to 100 m"),
+    ("planners.generate", ["--cell", "1e308"], 2, "expected 0.001 to 100 m"),
+    ("planners.generate", ["--style", "corridor", "--length", "1e9"], 2, "--length"),
     ("planners.view", ["{tmp}/absent"], 2, "no such file"),
     ("planners.view", ["{tmp}/walls.yaml"], 2, "not valid JSON"),
     ("planners.view", ["{tmp}/motion.json"], 2, "motion.json"),
+    ("planners.view", ["{tmp}/no_gaits"], 2, "index below 0"),
+    ("planners.view", ["{tmp}/cycle"], 2, "runs[0].cycles[0]"),
+    ("planners.view", ["{tmp}/still"], 2, "runs[0].cycles: is empty"),
+    ("planners.view", ["{tmp}/short"], 2, "3 instants where centre has 2"),
+    ("virtual_lab", ["--rate", "1e300"], 2, "--rate: expected at most"),
+    ("virtual_lab", ["--duration", "1e7"], 2, "--duration: expected at most"),
+    ("virtual_lab", ["--scale", "1e300", "--effect", "tether_drag"], 2, "--scale: expected at most"),
+    ("virtual_lab", ["--bench-error", "1e300"], 2, "--bench-error: expected at most"),
 ]  # fmt: skip
 
 
@@ -224,6 +255,31 @@ def test_help_tells_units_and_an_example(command, capsys):
     for option in ("--out", "--json", "--quiet", "--seed"):
         assert option in out
     assert re.search(r"\b(m|Hz|kPa|rad|s)\b", out)
+
+
+def test_more_than_fits_into_memory_is_one_line(capsys):
+    from srs_opt.command import make_parser, run_command
+
+    def greedy(options):
+        raise MemoryError("Unable to allocate 56 TiB")
+
+    assert run_command(make_parser("x", "y", "z"), greedy, []) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "56 TiB" in line and "ask for less" in line
+
+
+def test_points_beyond_the_horizon(files, capsys):
+    """A coordinate of 1e308 m once passed, and the fit wrote a robot of not-a-number."""
+    folder = files / "far"
+    assert run("virtual_lab", ["--duration", "1", "--quiet", "--out", str(folder)], files, capsys)[0] == 0
+    track = folder / "trials" / "t01.csv"
+    lines = track.read_text(encoding="utf-8").splitlines()
+    cells = lines[9].split(",")
+    lines[9] = ",".join([*cells[:3], "1e308", *cells[4:]])
+    track.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    status, _, err = run("srs_opt.calibrate", [str(folder), "--quiet"], files, capsys)
+    assert status == 2
+    assert "t01.csv:10: marker 2 stands 1e+308 m from the origin" in err
 
 
 def test_a_bug_is_one_line_too(capsys, monkeypatch):

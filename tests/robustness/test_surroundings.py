@@ -61,6 +61,21 @@ def test_out_is_a_file(arguments, tmp_path):
     assert "--out" in one_line(done)
 
 
+@pytest.mark.parametrize(
+    "arguments",
+    [["srs_opt.gait_opt"], ["planners.plan", "mazes/first.yaml"], ["srs_opt.calibrate", "nowhere"]],
+    ids=lambda a: a[0],
+)
+def test_out_is_a_file_is_said_before_the_work(arguments, tmp_path):
+    (tmp_path / "taken.txt").write_text("mine")
+    began = time.perf_counter()
+    done = run(arguments, "--out", tmp_path / "taken.txt")
+    assert done.returncode == 2
+    assert "taken.txt: cannot write" in one_line(done)
+    assert time.perf_counter() - began < 20
+    assert (tmp_path / "taken.txt").read_text() == "mine"
+
+
 @pytest.mark.skipif(not Path("/proc/version").exists(), reason="no folder that even root may not write to")
 @pytest.mark.parametrize(
     "arguments", [SIMULATE, ["srs_opt.gait_opt"], ["planners.plan", "mazes/first.yaml"]], ids=lambda a: a[0]
@@ -107,6 +122,28 @@ def test_reader_of_the_output_goes_away(tmp_path):
     os.close(writing)
     assert done.returncode == 141
     assert not done.stderr
+
+
+@pytest.mark.parametrize("arguments", [["virtual_lab", "--list"], SIMULATE], ids=lambda a: a[0])
+def test_reader_goes_away_or_was_never_there(arguments, tmp_path):
+    line, options = command(arguments, "--out", tmp_path / "out")
+    reading, writing = os.pipe()
+    os.close(reading)
+    done = subprocess.run(line, stdout=writing, stderr=subprocess.PIPE, timeout=100, check=False, **options)
+    os.close(writing)
+    assert (done.returncode, done.stderr) == (141, "")
+    shell = ["bash", "-c", '"$@" >&-', "bash", *line]
+    done = subprocess.run(shell, stderr=subprocess.PIPE, timeout=100, check=False, **options)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_names_that_the_terminal_cannot_show(tmp_path):
+    robot = tmp_path / "robot.yaml"
+    robot.write_text("name: Schlange Ü ± 蛇\n", encoding="utf-8")
+    where = tmp_path / "蛇"
+    done = run(SIMULATE, "--robot", robot, "--out", where, PYTHONIOENCODING="ascii")
+    assert done.returncode == 0, done.stderr
+    assert "\\u86c7" in done.stdout
 
 
 def test_no_compiler(tmp_path):

@@ -167,6 +167,44 @@ def test_play_pause_scrub_and_keys(page, tmp_path):
 
 
 @needs_browser
+def test_a_press_on_the_clearance_goes_there_and_no_two_gaits_share_a_colour(page, tmp_path):
+    report = browse(
+        page,
+        """const canvas = $("clearance"), box = canvas.getBoundingClientRect();
+        canvas.setPointerCapture = () => {};
+        const press = (name, share, buttons) => canvas.dispatchEvent(new PointerEvent(name, {
+          clientX: box.left + LEFT + share * (canvas.clientWidth - LEFT), clientY: box.top + 5, buttons}));
+        const place = () => time / run.duration_s, report = {gaits: motion.gaits.length};
+        press("pointerdown", 0.25, 1); report.pressed = place();
+        press("pointermove", 0.75, 1); report.dragged = place();
+        press("pointermove", 0.5, 0); report.hovered = place();
+        report.colours = new Set(motion.gaits.map((gait, k) => colour(k))).size;
+        report.names = [...document.querySelectorAll("#names > span")].map(name => name.textContent);
+        report.wide = document.documentElement.scrollWidth <= window.innerWidth;
+        finish(report);""",
+        tmp_path,
+    )
+    assert report["pressed"] == pytest.approx(0.25, abs=0.01)
+    assert report["dragged"] == report["hovered"] == pytest.approx(0.75, abs=0.01)
+    assert report["colours"] == report["gaits"] == len(report["names"])
+    assert report["wide"]
+
+
+def test_the_drawn_clearance_is_that_of_the_page(driven, tmp_path, monkeypatch):
+    """The certificate's own numbers are lower bounds where those suffice; what is drawn has no such steps."""
+    import planners.view.picture as picture
+    from planners.plan.certify import clearances
+
+    drawn = []
+    monkeypatch.setattr(
+        picture, "clearances", lambda *given: drawn.append(clearances(*given)) or drawn[-1].copy()
+    )
+    assert plan([str(ROOT / "mazes/first.yaml"), "--quiet", "--out", str(tmp_path)]) == 0
+    page_mm = read_motion(driven / "motion.json")["runs"][0]["clearance_mm"]
+    assert 1e3 * min(drawn[0]) == pytest.approx(min(page_mm), abs=1.0)
+
+
+@needs_browser
 def test_occupancy_maps_are_drawn(driven, tmp_path):
     """A map of cells is drawn where its cells are: one dark cell in the lower left quarter."""
     import base64
