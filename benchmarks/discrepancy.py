@@ -1,6 +1,6 @@
 """How often ``srs_opt.discrepancy`` is right, over sets from a laboratory that shares no code with it.
 
-    python -m benchmarks.discrepancy --sets 475 --seed 4 --jobs 2
+    python -m benchmarks.discrepancy --sets 475 --seed 5 --jobs 2
 
 Kinds of sets: ``null`` (nothing hidden; bench values off, noise misstated), ``typical`` (one effect at 0.7 to
 1.4 times its typical size, place at random), ``third`` (a third of that), ``unlisted`` (an effect in no

@@ -69,7 +69,8 @@ class Payoff:
 
 
 def _motion(orbit: Orbit) -> str:
-    return f"{orbit.speed_m_s:.3f} m/s and turns by {orbit.turn_rate_rad_s:+.3f} rad/s"
+    turn = round(orbit.turn_rate_rad_s, 3)
+    return f"{orbit.speed_m_s:.3f} m/s" + (f" and turns by {turn:+.3f} rad/s" if turn else ", straight")
 
 
 def payoff(

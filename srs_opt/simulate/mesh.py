@@ -6,7 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from srs_opt.errors import NoAnswerError
+
 ORDER = 4.0  # of the embedded error estimate's local error, h^4
+# of a motion that still deserves the name; parameters far from any robot's ask for millions, and gigabytes
+MOST_STEPS_PER_S, MOST_STEPS_AT_ALL = 50_000, 20_000
 
 
 @dataclass(frozen=True)
@@ -43,12 +47,23 @@ class Mesh:
         """Return a mesh whose steps should all make the same error `tolerance`.
 
         `error` (n,) is the estimate per step of this mesh; steps change by at most a factor 4.
+
+        Raises
+        ------
+        NoAnswerError
+            If that takes more steps than any motion of a real robot does.
         """
         density = np.clip((np.maximum(error, 1e-30) / tolerance) ** (1 / ORDER), 0.25, 4.0)
         density = _smoothed(density)
         phases, first = np.unique(self.phase, return_index=True)
         totals = np.add.reduceat(density, first)
         counts = np.maximum(np.ceil(totals).astype(int), 2)
+        span_s = float(self.h_s.sum())
+        if counts.sum() > max(MOST_STEPS_PER_S * span_s, MOST_STEPS_AT_ALL):
+            raise NoAnswerError(
+                f"the motion cannot be integrated: {span_s:.3g} s of it would take {counts.sum()} steps; "
+                "parameters are far from those of any robot"
+            )
         # the running count of new steps, made whole at every phase's end
         level = np.concatenate(
             [[0.0], np.cumsum(density * np.repeat(counts / totals, np.diff([*first, error.size])))]
