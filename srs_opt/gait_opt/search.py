@@ -15,6 +15,7 @@ from srs_opt.gait_opt.aim import within
 from srs_opt.gait_opt.certificate import Certificate
 from srs_opt.gait_opt.collocation.problem import CycleProblem
 from srs_opt.gait_opt.finish import topped
+from srs_opt.gait_opt.goal import Goal
 from srs_opt.gait_opt.ladder import Climb, Rung, Step, climb, ladder, orbits_of
 from srs_opt.gait_opt.score import Score, score
 from srs_opt.gait_opt.starts import starting_gaits, steered
@@ -26,6 +27,7 @@ _CARRIED = 2  # starts that are carried to the robot's own friction
 _ALIKE = 1e-3  # merits closer than this are one optimum
 _EXACT_REACH = 0.01  # cycles that the switches may move in the last stage
 _NEAR_REACH, _MOVED_REACH = 0.05, 0.02  # the same for earlier results that keep the new limits, or do not
+_BEYOND = 0.03  # share by which a wanted speed may exceed the fastest gait's before it is refused at once
 _KEPT = 5e-3  # miss below which a gait keeps the limits
 _MOVED = Rung(0.01, 36, 0.1, 2, quick=True)  # friction that forgives, for results that had to move
 
@@ -96,9 +98,11 @@ def search(
     Raises
     ------
     NoAnswerError
-        If no start leads anywhere.
+        If no start leads anywhere, or the wanted speed lies beyond that of the fastest gait.
     """
     begun = time.perf_counter()
+    if warm is None and problem.goal.speed_m_s:
+        _refuse_out_of_reach(problem, problem.goal.speed_m_s, starts, seed, where)
     own = max(r.friction_speed_m_s for r in problem.robots)
     if warm is None:
         candidates = starting_gaits(problem, starts, seed)
@@ -140,6 +144,21 @@ def search(
         time.perf_counter() - begun,
         interrupted,
     )
+
+
+def _refuse_out_of_reach(
+    problem: CycleProblem, speed_m_s: float, starts: int, seed: int, where: Where
+) -> None:
+    """Refuse a speed that even the fastest straight gait does not make, before the long search for it."""
+    only_fast = replace(problem, robots=problem.robots[:1], goal=Goal("speed"))
+    fastest = search(only_fast, starts, seed, where=where)
+    if fastest.interrupted:
+        raise KeyboardInterrupt
+    if speed_m_s > (1 + _BEYOND) * fastest.certificate.speed_m_s:
+        raise NoAnswerError(
+            f"no gait makes {speed_m_s:g} m/s: the fastest that was found within these limits runs at "
+            f"{fastest.certificate.speed_m_s:.3f} m/s; ask for less, or widen --pressure or --frequency"
+        )
 
 
 @dataclass(frozen=True)

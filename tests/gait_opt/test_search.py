@@ -94,6 +94,12 @@ def test_wanted_radius_and_band():
     assert found.orbits[0].speed_m_s > 0.45
 
 
+def test_a_speed_out_of_reach_is_refused_with_the_fastest_in_reach():
+    goal = Goal("slim", speed_m_s=0.7)
+    with pytest.raises(NoAnswerError, match=r"no gait makes 0.7 m/s: the fastest .* runs at 0\.5\d\d m/s"):
+        search(CycleProblem((ROBOT,), "complex", goal, Limits()), starts=1)
+
+
 @pytest.mark.slow
 def test_one_gait_for_robots_with_other_friction():
     robots = tuple(
