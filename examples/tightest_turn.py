@@ -22,7 +22,7 @@ def draw(gaits: dict[str, Orbit], stem: Path) -> None:
     for (name, orbit), colour in zip(gaits.items(), COLOURS):
         centre = centre_of_rotation(orbit.motion.displacement)
         assert centre is not None and orbit.radius_m is not None
-        _, _, x, y = body_over_cycle(integrator(robot), orbit.time_s, orbit.pose, orbit.kappa, orbit.gait)
+        _, _, x, y = body_over_cycle(integrator(robot), orbit.time_s, orbit.pose, orbit.kappa)
         for k in (0, 24):
             draw_body(axes, x[:, k] - centre[0], y[:, k] - centre[1], robot.body_width_m, color=colour)
         turn = np.linspace(0, 2 * np.pi, 200)

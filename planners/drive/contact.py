@@ -9,12 +9,11 @@ from planners.motion.table import body_in_room
 from planners.search.clearance import BodyClearance
 from planners.search.problem import Problem
 from planners.search.tree import arrival_index
-from srs_opt.model.outline import centre_line_function
 from srs_opt.robot import Robot
 from srs_opt.simulate.integrate import Integrator
+from srs_opt.simulate.shapes import centre_lines
 
 Array = NDArray[np.float64]
-_BATCH = 256
 
 
 class BodyWatch:
@@ -33,8 +32,7 @@ class BodyWatch:
     def __init__(self, problem: Problem, robot: Robot, run: Integrator) -> None:
         self._goal = problem.goal
         self._body = BodyClearance(problem.maze, problem.field, robot.body_width_m / 2, 0.0)
-        self._line = centre_line_function(run.structure, _BATCH)
-        self._p = run.pack(0.0, 1.0)  # geometry depends on neither
+        self._run = run
         self._time: list[Array] = []
         self._pose: list[Array] = []
         self._lines: list[Array] = []
@@ -48,7 +46,7 @@ class BodyWatch:
 
         Times (n,) start at 0, poses are (n, 3), curvatures (n, N-1). The record also ends at contact.
         """
-        lines = body_in_room(self._shapes(kappa), pose)
+        lines = body_in_room(centre_lines(self._run, kappa), pose)
         room = self._clearances(lines)
         arrived = arrival_index(self._goal, pose) if ends else None
         contact = int(np.argmax(room <= 0)) if (room <= 0).any() else None
@@ -69,12 +67,6 @@ class BodyWatch:
     def record(self) -> tuple[Array, Array, Array]:
         """Return times (n,), poses (n, 3) and centre lines (n, points, 2) of everything looked at."""
         return np.concatenate(self._time), np.concatenate(self._pose), np.concatenate(self._lines)
-
-    def _shapes(self, kappa: Array) -> Array:
-        n = len(kappa)
-        padded = np.pad(kappa.T, ((0, 0), (0, -n % _BATCH)))
-        pieces = [self._line(padded[:, k : k + _BATCH], self._p) for k in range(0, padded.shape[1], _BATCH)]
-        return np.concatenate([np.stack([np.asarray(x).T, np.asarray(y).T], axis=-1) for x, y in pieces])[:n]
 
     def _clearances(self, lines: Array) -> Array:
         """Return clearances (n,): exact where walls are near, else a lower bound."""

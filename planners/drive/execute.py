@@ -29,6 +29,7 @@ from srs_opt.simulate.timeline import Timeline
 Array = NDArray[np.float64]
 ASTRAY_M = 0.06  # farther from the plan than this: plan anew
 STOP_CLEARANCE_M = -0.004  # a cycle that should by table run deeper into a wall than this is not begun
+LEAST_ROOM_M = 0.001  # foreseen, below which a halt is the better choice
 ON_TRACK = (0.004, 0.004, 0.03, 0.04)  # off the plan's place (m), heading (rad), speed (m/s): it is played on
 MOST_TRIED = 8  # gaits, before a cycle is given up
 MOST_IDLE = 4  # cycles without progress along the plan
@@ -162,16 +163,18 @@ class _Drive:
     def _choice(self) -> Choice:
         """Return the plan's gait where the robot is as planned, else the best that keeps off the walls.
 
-        It should do so with any friction that the robot may have, at least with the planned one. Where every
-        gait that was tried touches, the first is returned with a clearance that forbids it.
+        It should leave half the margin with any friction that the robot may have; else the gait is taken that
+        leaves the most. Where every gait that was tried touches, the first is returned with a clearance that
+        forbids it.
         """
         where = Where(self.state[:3].copy(), self.before, float(self.state[3]))
         state = self._as_planned()
         planned = self._gait_by_plan(state)
-        if planned is not None and self._room_m(state, planned) > self.problem.margin_m / 2:
+        enough_m = self.problem.margin_m / 2
+        if planned is not None and self._room_m(state, planned, surely=True) > enough_m:
             return by_plan(self.problem, where, self.learned, planned)
         tried: list[Choice] = []
-        second: Choice | None = None
+        second, most_m = None, LEAST_ROOM_M
         while len(tried) < MOST_TRIED:
             barred = [choice.gait for choice in tried]
             choice = choose(self.problem, self.reference, where, self.learned, self.node, barred)
@@ -179,9 +182,11 @@ class _Drive:
             if choice.clearance_m < STOP_CLEARANCE_M:
                 break
             if self._room_m(state, choice.gait) > 0:
-                if self._room_m(state, choice.gait, surely=True) > 0:
+                least_m = self._room_m(state, choice.gait, surely=True)
+                if least_m > enough_m:
                     return choice
-                second = second or choice
+                if least_m > most_m:
+                    second, most_m = choice, least_m
         return second or replace(tried[0], clearance_m=-math.inf)
 
     def _room_m(self, state: Array, gait: int, *, surely: bool = False) -> float:
@@ -230,8 +235,9 @@ class _Drive:
     def _cycle(self, index: int) -> str | None:
         """Play one cycle; return what ended the drive, if anything."""
         gait = self.problem.gaits.gaits[index].gait
-        begin = self.state[:3].copy()
-        trajectory = self.run.run(Timeline.of_gait(gait, gait.period_s), self.state)
+        begin, before = self.state[:3].copy(), self._as_planned()
+        cycle = Timeline.of_gait(gait, gait.period_s)
+        trajectory = self.run.run(cycle, self.state)
         arrived = self.watch.look(trajectory.time_s, trajectory.pose, trajectory.kappa)
         self.state = trajectory.final
         self.played.append(index)
@@ -240,6 +246,7 @@ class _Drive:
             return "contact"
         if arrived:
             return "arrived"
+        self.foresight.learn(before, cycle, self._as_planned())
         c, s = math.cos(begin[2]), math.sin(begin[2])
         dx, dy, turn = self.state[:3] - begin
         observed = np.array([c * dx + s * dy, c * dy - s * dx, turn])

@@ -1,8 +1,14 @@
-"""What room the body will have, simulated on the planned robot and on others that differ from it a little."""
+"""What room the body will have, simulated with the friction that the driven robot seems to have.
+
+Whatever slows a robot down or lets it slide is seen as friction: after every cycle, those frictions stay
+possible that would have led near to where the robot is. What the driver thinks of doing is looked at with all
+of them.
+"""
 
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +20,17 @@ from srs_opt.errors import NoAnswerError
 from srs_opt.orbit.steady import integrator
 from srs_opt.simulate.timeline import Timeline
 
-ROUGHNESS = (1.0, 0.8, 1.2)  # friction over the planned robot's
+Array = NDArray[np.float64]
+# friction along and across the wheels, over the planned robot's; a hose that drags is felt along the wheels
+FRICTIONS = ((1.0, 1.0), (0.8, 0.8), (1.2, 1.2), (0.8, 1.0), (1.25, 1.0), (1.5, 1.0), (2.0, 1.0))
+FADING = 0.7  # of what earlier cycles told, per cycle
+SCALES = np.array(
+    [0.01, 0.01, 0.05, 0.05]
+)  # misses of place (m), heading (rad), speed (m/s) that weigh alike
+PLAUSIBLE, TIMES = (
+    1.0,
+    3.0,
+)  # squared miss, and times the least one, up to which a friction is thought possible
 
 
 class Foresight:
@@ -32,18 +48,32 @@ class Foresight:
             integrator(
                 undelayed(
                     robot.with_values(
-                        friction_tangential=share * robot.friction_tangential,
-                        friction_normal=share * robot.friction_normal,
+                        friction_tangential=along * robot.friction_tangential,
+                        friction_normal=across * robot.friction_normal,
                     )
                 ),
                 problem.gaits.model,
             )
-            for share in ROUGHNESS
+            for along, across in FRICTIONS
         ]
+        self._misses = np.zeros(len(FRICTIONS))
 
-    def room_m(self, state: NDArray[np.float64], timeline: Timeline, model: int = 0) -> float:
-        """Return the smallest clearance with one friction; minus infinity where the model cannot go on."""
-        run = self._runs[model]
+    def learn(self, before: Array, timeline: Timeline, after: Array) -> None:
+        """Take in one cycle: the state it began with and the state it ended with."""
+        misses = np.full(len(FRICTIONS), math.inf)
+        for k, run in enumerate(self._runs):
+            with suppress(NoAnswerError):
+                off = run.run(timeline, before).final[:4] - after[:4]
+                off[2] = (off[2] + math.pi) % (2 * math.pi) - math.pi
+                misses[k] = ((off / SCALES) ** 2).sum()
+        self._misses = FADING * self._misses + misses
+
+    def room_m(self, state: Array, timeline: Timeline, friction: int | None = None) -> float:
+        """Return the smallest clearance with the likeliest friction, or another of FRICTIONS.
+
+        Minus infinity where the model cannot go on.
+        """
+        run = self._runs[int(self._misses.argmin()) if friction is None else friction]
         try:
             trajectory = run.run(timeline, state)
         except NoAnswerError:
@@ -52,13 +82,13 @@ class Foresight:
         watch.look(trajectory.time_s, trajectory.pose, trajectory.kappa, ends=False)
         return watch.smallest_m
 
-    def least_room_m(
-        self, state: NDArray[np.float64], timeline: Timeline, worth_m: float = -math.inf
-    ) -> float:
+    def least_room_m(self, state: Array, timeline: Timeline, worth_m: float = -math.inf) -> float:
         """Return the smallest clearance with any friction; given up at one that leaves at most `worth_m`."""
         least_m = math.inf
-        for model in range(len(self._runs)):
-            least_m = min(least_m, self.room_m(state, timeline, model))
+        possible = self._misses <= PLAUSIBLE + TIMES * self._misses.min()
+        for friction in np.argsort(self._misses, kind="stable"):
+            if possible[friction]:
+                least_m = min(least_m, self.room_m(state, timeline, int(friction)))
             if least_m <= worth_m:
                 break
         return least_m

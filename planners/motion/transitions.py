@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 from planners.motion.table import SAMPLES, MotionTable
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait_opt.table import GaitTable, TableGait
-from srs_opt.model.outline import centre_line_function
 from srs_opt.orbit.solve import periodic_actuators
 from srs_opt.orbit.steady import integrator
 from srs_opt.robot import Robot
 from srs_opt.simulate.integrate import Integrator
 from srs_opt.simulate.mesh import Mesh
 from srs_opt.simulate.rosenbrock import BODY_STATES, VELOCITY
+from srs_opt.simulate.shapes import centre_lines
 from srs_opt.simulate.together import Search, together
 
 LEVELS = 8  # forward speeds per gait before
@@ -120,7 +120,7 @@ def motion_table(robot: Robot, table: GaitTable, transitions: Transitions) -> Mo
         speed_m_s=transitions.speed_m_s,
         speed_after_m_s=transitions.speed_after_m_s,
         pose=transitions.pose,
-        body=_bodies(integrator(robot, table.model), table, transitions.kappa),
+        body=_bodies(integrator(robot, table.model), transitions.kappa),
         body_width_m=robot.body_width_m,
     )
 
@@ -159,13 +159,10 @@ def _all(searches: list[Search[_Outcome]]) -> list[_Outcome]:
     return outcomes
 
 
-def _bodies(run: Integrator, table: GaitTable, kappa: np.ndarray) -> np.ndarray:
+def _bodies(run: Integrator, kappa: np.ndarray) -> np.ndarray:
     """Return centre lines (before, now, SAMPLES + 1, points, 2) in the robot's frame."""
-    n = len(table.gaits)
     rows = []
-    for now, entry in enumerate(table.gaits):
-        p = run.pack(entry.gait.pressure_kpa, entry.gait.frequency_hz)
-        flat = kappa[:, now].reshape(-1, kappa.shape[-1]).T
-        x, y = (np.asarray(v) for v in centre_line_function(run.structure, flat.shape[1])(flat, p))
-        rows.append(np.stack([x, y], axis=-1).reshape(-1, n + 1, SAMPLES + 1, 2).transpose(1, 2, 0, 3))
-    return np.stack(rows, axis=1).astype(np.float32)
+    for before in kappa:  # one by one: single precision takes half the memory
+        lines = centre_lines(run, before.reshape(-1, before.shape[-1])).astype(np.float32)
+        rows.append(lines.reshape(*before.shape[:-1], *lines.shape[1:]))
+    return np.stack(rows)

@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 from planners.motion.table import body_in_room
 from planners.search.problem import ROUNDING_M, Problem
 from planners.search.tree import Root, arrival_index, at_rest
-from srs_opt.model.outline import POINTS_PER_ARC, centre_line_function
+from srs_opt.model.outline import POINTS_PER_ARC
 from srs_opt.simulate.integrate import Trajectory
+from srs_opt.simulate.shapes import centre_lines
 from srs_opt.simulate.timeline import Timeline
 
 Array = NDArray[np.float64]
 TOLERANCE_M_S = 1e-5
 EXACT_BELOW_M = 0.03  # of clearance; above, the table's lower bound will do
-_BATCH = 256
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ def certify(problem: Problem, gaits: Sequence[int], root: Root | None = None) ->
         played.append(problem.run.run(Timeline.of_gait(gait, gait.period_s), state, TOLERANCE_M_S))
         state = played[-1].final
     time, pose, kappa, cycle = _joined(played)
-    lines = _lines(problem, pose, kappa)
+    lines = body_in_room(centre_lines(problem.run, kappa), pose)
     arrived = arrival_index(problem.goal, pose)
     last = len(time) if arrived is None else arrived + 1
     time, pose, lines, kappa, cycle = time[:last], pose[:last], lines[:last], kappa[:last], cycle[:last]
@@ -114,17 +114,6 @@ def _joined(played: Sequence[Trajectory]) -> tuple[Array, Array, Array, NDArray[
     counts = [1, *(t.time_s.size - 1 for t in played)]
     cycle = np.repeat([0, *range(len(played))], counts)
     return np.concatenate(time), np.concatenate(pose), np.concatenate(kappa), cycle
-
-
-def _lines(problem: Problem, pose: Array, kappa: Array) -> Array:
-    """Return the centre lines (n, points, 2) in the room."""
-    p = problem.run.pack(0.0, 1.0)  # geometry depends on neither pressure nor frequency
-    n = len(kappa)
-    padded = np.pad(kappa.T, ((0, 0), (0, -n % _BATCH)))
-    line = centre_line_function(problem.run.structure, _BATCH)
-    pieces = [line(padded[:, k : k + _BATCH], p) for k in range(0, padded.shape[1], _BATCH)]
-    body = np.concatenate([np.stack([np.asarray(x).T, np.asarray(y).T], axis=-1) for x, y in pieces])[:n]
-    return body_in_room(body, pose)
 
 
 def clearances(problem: Problem, lines: Array, limit_m: float = EXACT_BELOW_M) -> Array:

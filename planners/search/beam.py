@@ -21,8 +21,8 @@ from planners.search.tree import Root, Step, Tree, arrival_index, at_rest, cell_
 
 TOGETHER = 8  # cycles simulated in one go
 FIRST_LOOK = 32  # gaits whose bodies are looked at first, most promising first
-NARROW, WIDE, WIDTH_TIMES_S = 12, 32, 200.0  # widths of beams, and width times seconds to go
-DOUBTFUL, STALLED = 4, 10  # cycles without coming nearer to the goal: in doubt, given up
+NARROW, WIDE, WIDTH_TIMES_S = 15, 40, 260.0  # widths of beams, and width times seconds to go
+DOUBTFUL, STALLED = 3, 10  # cycles without coming nearer to the goal: in doubt, given up
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class BeamSettings:
     course_rad: float = math.radians(15)
     speed_m_s: float = 0.1
     change_s: float = 0.02
-    air_s: float = 0.1
+    air_s: float = 0.07
     slack_m: float = 0.0005
 
 
@@ -80,7 +80,7 @@ class BeamSearch:
         self._cheapest: dict[tuple[int, ...], float] = {}
         self._best: tuple[float, int] | None = None
         self._nearest, self._stalled = math.inf, 0
-        to_go_s = float(problem.to_goal.at(root.state[None, :2])[0]) + 0.1
+        to_go_s = self._to_go_s(self._front) + 0.1
         self._width = self.settings.width or round(min(max(WIDTH_TIMES_S / to_go_s, NARROW), WIDE))
 
     @property
@@ -98,13 +98,22 @@ class BeamSearch:
         last = self.expanded + expansions
         while self._front and self.expanded < last:
             offers = sorted(offer for node in self._front for offer in self._offers(node))
-            nearest = min((offer.rank - offer.spent for offer in offers), default=math.inf)
+            self._front = self._chosen(offers)
+            nearest = self._to_go_s(self._front)
             self._stalled = 0 if nearest < self._nearest else self._stalled + 1
             self._nearest = min(nearest, self._nearest)
-            self._front = self._chosen(offers) if self._stalled < STALLED else []
+            if self._stalled == STALLED:
+                self._front = []
         if self._front or self._best is None:
             return None
         return self._tree.way_to(self._best[1])
+
+    def _to_go_s(self, nodes: list[int]) -> float:
+        """Return the least price to the goal from the centres of mass of some nodes."""
+        if not nodes:
+            return math.inf
+        places = np.array([self._tree.cycle[node].state[:2] for node in nodes])
+        return float(self.problem.to_goal.at(places).min())
 
     def _offers(self, node: int) -> list[_Offer]:
         """Return the cycles that may follow a state, by the motion table."""

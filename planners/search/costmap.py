@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 NODES, MOST_NODES = 40_000, 1_500_000
 FINEST_M = 0.006
 BLOCKED_S = 1e6
+COMFORT = 1.5  # times the reach of the fastest gait is room enough for every gait at full speed
 # neighbours up to a knight's move: paths at most 2.7 % too long
 _STEPS = [(0, 1), (1, 0), (1, 1), (1, -1), (1, 2), (2, 1), (1, -2), (2, -1)]
 
@@ -122,9 +123,9 @@ def cost_map(
 
 
 def _slowness(room: Array, reach: Array, speed: Array) -> Array:
-    """Return seconds per metre: the fastest gait that fits, and a little less near walls."""
+    """Return seconds per metre: the fastest gait that fits, and a little less where it just fits."""
     fitting = np.searchsorted(reach, room, side="right") - 1
     best = np.where(fitting >= 0, speed[np.maximum(fitting, 0)], 0.25 * speed[0])
     best = np.maximum(best, 0.1 * speed[-1])
-    comfortable = np.clip(room / (1.5 * reach.max()), 0.3, 1.0)
+    comfortable = np.clip(room / (COMFORT * reach[int(speed.argmax())]), 0.3, 1.0)
     return 1 / (best * comfortable)

@@ -21,6 +21,7 @@ PRICES: tuple[Price, ...] = get_args(Price)
 TIME_COUNTS = 0.3  # of a second per second where time is not the price: dawdling is never free
 NEAR_WIDTHS, NEAR_FACTOR = 2.0, 3.0  # within so many body widths of air, up to so much dearer
 DEARER = 1.3  # than the cheapest gait, straight and steady, is a metre of way as a rule
+START_UP_S = 0.6  # that a start from rest costs more than a flying one
 SLOW = 0.1  # of the top speed; slower gaits say nothing of what a metre costs
 
 
@@ -55,8 +56,8 @@ class Tariff:
 
     @property
     def start_up(self) -> float:
-        """Return what a start from rest costs more than a flying one: about a second, and more of its air."""
-        return {"length": TIME_COUNTS, "air": 1.5}.get(self.price, 1.0)
+        """Return what a start from rest costs more than a flying one; more of its air."""
+        return {"length": TIME_COUNTS, "air": 1.5}.get(self.price, START_UP_S)
 
     @property
     def top_speed_m_s(self) -> float:

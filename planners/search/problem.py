@@ -20,12 +20,12 @@ from planners.search.costmap import CostMap, cost_map
 from planners.search.price import Price, Tariff
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait_opt.table import GaitTable
-from srs_opt.model.outline import centre_line_function
 from srs_opt.orbit.steady import integrator
 from srs_opt.robot import Robot
 from srs_opt.simulate.integrate import Integrator
 from srs_opt.simulate.mesh import Mesh
 from srs_opt.simulate.rosenbrock import BODY_STATES
+from srs_opt.simulate.shapes import centre_lines
 from srs_opt.simulate.together import together
 
 Array = NDArray[np.float64]
@@ -52,13 +52,16 @@ class Cycle:
 
 
 class _Plan(NamedTuple):
-    """How a gait's cycle is integrated: mesh, valves (N-1, phases), parameters, nodes and samples in time."""
+    """How a gait's cycle is integrated: mesh, valves (N-1, phases), parameters; and sampled.
+
+    Sample k lies between nodes `low[k]` and the next, at `share[k]` of the way.
+    """
 
     mesh: Mesh
     valve: Array
     p: Array
-    time_s: Array
-    at_s: Array
+    low: NDArray[np.int64]
+    share: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +148,9 @@ class Problem:
             mesh = Mesh.uniform(durations, STEP_S)
             time = np.concatenate([[0.0], np.cumsum(mesh.h_s)])
             p = self.run.pack(entry.gait.pressure_kpa, entry.gait.frequency_hz)
-            cycles.append(_Plan(mesh, valve, p, time, np.linspace(0.0, time[-1], SAMPLES + 1)))
+            at = np.linspace(0.0, time[-1], SAMPLES + 1)
+            low = np.clip(np.searchsorted(time, at, side="right") - 1, 0, time.size - 2)
+            cycles.append(_Plan(mesh, valve, p, low, (at - time[low]) / mesh.h_s[low]))
         return cycles
 
     def simulate(self, state: Array, gait: int) -> Cycle:
@@ -164,18 +169,29 @@ class Problem:
         searches = [
             self.run.stepping(state, plan.mesh, plan.valve, plan.p) for (state, _), plan in zip(begins, plans)
         ]
-        return [
-            None if isinstance(found, NoAnswerError) else self._cycle(state, plan, found[0])
-            for (state, _), plan, found in zip(begins, plans, together(searches))
+        found = together(searches)
+        went = [
+            (state, plan, outcome[0])
+            for (state, _), plan, outcome in zip(begins, plans, found)
+            if not isinstance(outcome, NoAnswerError)
         ]
+        cycles = iter(self._kept(went))
+        return [None if isinstance(outcome, NoAnswerError) else next(cycles) for outcome in found]
 
-    def _cycle(self, state: Array, plan: _Plan, states: Array) -> Cycle:
-        """Return the cycle that went through `states` (nx, n) after `state`."""
-        everything = np.concatenate([state[:, None], states], axis=1)
-        n = self.robot.segments
-        wanted = [0, 1, 2, *range(BODY_STATES, BODY_STATES + n)]
-        sampled = np.stack([np.interp(plan.at_s, plan.time_s, everything[i]) for i in wanted])
-        pose = sampled[:3].T
-        line = centre_line_function(self.run.structure, SAMPLES + 1)
-        x, y = (np.asarray(v) for v in line(sampled[3:], plan.p))
-        return Cycle(states[:, -1], pose, body_in_room(np.stack([x.T, y.T], axis=-1), pose))
+    def _kept(self, went: list[tuple[Array, _Plan, Array]]) -> list[Cycle]:
+        """Return the cycles that went through states (nx, n) after a state."""
+        if not went:
+            return []
+        samples = np.stack([_sampled(state, plan, states) for state, plan, states in went])
+        curved = samples[..., BODY_STATES : BODY_STATES + self.robot.segments]
+        lines = centre_lines(self.run, curved.reshape(-1, curved.shape[-1]))
+        pose = samples[..., :3]
+        placed = body_in_room(lines.reshape(*curved.shape[:-1], *lines.shape[1:]), pose)
+        return [Cycle(states[:, -1], *kept) for (_, _, states), *kept in zip(went, pose, placed)]
+
+
+def _sampled(state: Array, plan: _Plan, states: Array) -> Array:
+    """Return the samples (SAMPLES + 1, nx) of a cycle through `states` (nx, n) after `state`."""
+    everything = np.concatenate([state[None], states.T])
+    low, share = plan.low, plan.share[:, None]
+    return np.asarray((1 - share) * everything[low] + share * everything[low + 1])

@@ -157,7 +157,7 @@ def _wishes_missed(goal: Goal, orbit: Orbit) -> list[str]:
 def self_clearance_m(robot: Robot, orbit: Orbit, model: str = "complex") -> float:
     """Return the room between parts of the body that are not neighbours, over a cycle (negative: overlap)."""
     run = integrator(robot, model)
-    _, _, x, y = body_over_cycle(run, orbit.time_s, orbit.pose, orbit.kappa, orbit.gait)
+    _, _, x, y = body_over_cycle(run, orbit.time_s, orbit.pose, orbit.kappa)
     along = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x[:, 0]), np.diff(y[:, 0])))])
     apart = np.abs(along[:, None] - along[None]) > 1.6 * robot.body_width_m  # half a turn of its own width
     if not apart.any():

@@ -57,7 +57,7 @@ def _body(axes: Axes, robot: Robot, model: str, orbit: Orbit) -> None:
     from srs_opt.orbit.motion import rotate
 
     run = integrator(robot, model)
-    at, poses, x, y = body_over_cycle(run, orbit.time_s, orbit.pose, orbit.kappa, orbit.gait)
+    at, poses, x, y = body_over_cycle(run, orbit.time_s, orbit.pose, orbit.kappa)
     turn_rate = orbit.motion.displacement[2] / orbit.gait.period_s
     heading = (poses[:, 2] - turn_rate * at).mean()
     colours = colormaps[SEQUENTIAL]
@@ -111,7 +111,7 @@ def _speeds(axes: Axes, orbit: Orbit) -> None:
 
 def _reach(axes: Axes, robot: Robot, model: str, orbit: Orbit) -> None:
     run = integrator(robot, model)
-    at, poses, x, y = body_over_cycle(run, orbit.time_s, orbit.pose, orbit.kappa, orbit.gait, 97)
+    at, poses, x, y = body_over_cycle(run, orbit.time_s, orbit.pose, orbit.kappa, 97)
     centre = centre_of_rotation(orbit.motion.displacement)
     right, left = orbit.envelope_m
     if orbit.radius_m is None or centre is None:

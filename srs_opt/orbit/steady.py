@@ -10,15 +10,12 @@ import numpy as np
 
 from srs_opt.errors import InputError, NoAnswerError
 from srs_opt.gait import Gait
-from srs_opt.model.outline import centre_line_function
-from srs_opt.model.parameters import Structure
 from srs_opt.orbit.motion import CycleMotion, cycle_motion, rotate
 from srs_opt.orbit.solve import PeriodicSolution, search_orbit
 from srs_opt.robot import Robot
-from srs_opt.simulate.buffered import Buffered
-from srs_opt.simulate.compiled import compiled
 from srs_opt.simulate.integrate import TOLERANCE_M_S, Integrator
 from srs_opt.simulate.rosenbrock import BODY_STATES, VELOCITY, WORK
+from srs_opt.simulate.shapes import centre_lines
 from srs_opt.simulate.together import Search, alone, together
 from srs_opt.sweep import sweep
 
@@ -188,7 +185,7 @@ def _search(run: Integrator, gait: Gait, tolerance: float, guess: np.ndarray | N
     states = np.concatenate([solution.start[:, None], solution.states], axis=1)
     pose, kappa = states[:3].T, states[BODY_STATES : BODY_STATES + robot.segments].T
     # the delay of the valves shifts the whole cycle in time and changes nothing else
-    motion = cycle_motion(*body_over_cycle(run, time_s, pose, kappa, gait), robot.body_width_m)
+    motion = cycle_motion(*body_over_cycle(run, time_s, pose, kappa), robot.body_width_m)
     multipliers = np.linalg.eigvals(solution.monodromy)
     return Orbit(
         gait=gait,
@@ -209,22 +206,12 @@ def body_over_cycle(
     time_s: np.ndarray,
     pose: np.ndarray,
     kappa: np.ndarray,
-    gait: Gait,
     samples: int = SAMPLES,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return times (samples,), poses (samples, 3) and centre lines x, y (points, samples) in the room."""
     at = np.linspace(0.0, time_s[-1], samples)
     poses = np.stack([np.interp(at, time_s, column) for column in pose.T], axis=1)
     kappas = np.stack([np.interp(at, time_s, column) for column in kappa.T])
-    line = _centre_lines(run.structure, samples)
-    line.arguments[0][:], line.arguments[1][0] = kappas.T, run.pack(gait.pressure_kpa, gait.frequency_hz)
-    line.evaluate()
-    x, y = (points.T for points in line.results)
+    x, y = centre_lines(run, kappas.T).T
     room_x, room_y = rotate(poses[:, 2], x, y)
     return at, poses, room_x + poses[:, 0], room_y + poses[:, 1]
-
-
-@lru_cache(maxsize=32)
-def _centre_lines(structure: Structure, samples: int) -> Buffered:
-    key = f"centre lines {samples} {structure}"
-    return Buffered(compiled(key, lambda: centre_line_function(structure, samples)))

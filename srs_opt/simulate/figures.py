@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from srs_opt.figures import COLOURS, PAGE_IN, draw_body, new_figure, save_figure, styled
-from srs_opt.model.outline import centre_line_function
 from srs_opt.orbit.motion import rotate
 from srs_opt.robot import Robot
 from srs_opt.simulate.integrate import Integrator
 from srs_opt.simulate.run import Simulation
+from srs_opt.simulate.shapes import centre_lines
 
 
 @styled
@@ -23,10 +23,9 @@ def draw_simulation(robot: Robot, model: str, result: Simulation, stem: Path) ->
     )
     room.plot(path.pose[:, 0], path.pose[:, 1], color=COLOURS[6], linewidth=0.8, label="centre of mass")
     run = Integrator(robot, model)
-    p = run.pack(result.gait.pressure_kpa, result.gait.frequency_hz)
     shown = np.linspace(0, _until(result), 7)
     pose, kappa = path.at(shown)
-    x, y = (np.asarray(v) for v in centre_line_function(run.structure, shown.size)(kappa.T, p))
+    x, y = centre_lines(run, kappa).T
     x, y = rotate(pose[:, 2], x, y)
     for k in range(shown.size):
         shade = 0.25 + 0.6 * k / (shown.size - 1)

@@ -9,11 +9,11 @@ import numpy as np
 
 from srs_opt.errors import InputError
 from srs_opt.gait import Gait
-from srs_opt.model.outline import centre_line_function
 from srs_opt.orbit.motion import CycleMotion, cycle_motion, rotate
 from srs_opt.robot import Robot
 from srs_opt.simulate import compiled
 from srs_opt.simulate.integrate import TOLERANCE_M_S, Integrator, Trajectory
+from srs_opt.simulate.shapes import centre_lines
 from srs_opt.simulate.timeline import Timeline
 
 LONGEST_S, MOST_CYCLES = 100_000.0, 1_000_000
@@ -106,8 +106,7 @@ def motion_of_cycle(run: Integrator, trajectory: Trajectory, gait: Gait, cycle: 
     last = int(np.searchsorted(times, (cycle + 1) * gait.period_s - 1e-9))
     pose, kappa = trajectory.pose[first : last + 1], trajectory.kappa[first : last + 1]
     pose = pose - np.array([pose[0, 0], pose[0, 1], 0.0])
-    p = run.pack(gait.pressure_kpa, gait.frequency_hz)
-    x, y = (np.asarray(v) for v in centre_line_function(run.structure, len(pose))(kappa.T, p))
+    x, y = centre_lines(run, kappa).T
     x, y = rotate(pose[:, 2], x, y)
     elapsed = times[first : last + 1] - times[first]
     return cycle_motion(elapsed, pose, x + pose[:, 0], y + pose[:, 1], run.robot.body_width_m)
