@@ -21,7 +21,7 @@ from planners.search.tree import Root, Step, Tree, arrival_index, at_rest, cell_
 
 TOGETHER = 8  # cycles simulated in one go
 FIRST_LOOK = 32  # gaits whose bodies are looked at first, most promising first
-NARROW, WIDE, WIDTH_TIMES_S = 15, 40, 260.0  # widths of beams, and width times seconds to go
+NARROW, WIDE, WIDTH_TIMES_S = 12, 32, 200.0  # widths of beams, and width times seconds to go
 DOUBTFUL, STALLED = 3, 10  # cycles without coming nearer to the goal: in doubt, given up
 
 
