@@ -24,13 +24,10 @@ Array = NDArray[np.float64]
 # friction along and across the wheels, over the planned robot's; a hose that drags is felt along the wheels
 FRICTIONS = ((1.0, 1.0), (0.8, 0.8), (1.2, 1.2), (0.8, 1.0), (1.25, 1.0), (1.5, 1.0), (2.0, 1.0))
 FADING = 0.7  # of what earlier cycles told, per cycle
-SCALES = np.array(
-    [0.01, 0.01, 0.05, 0.05]
-)  # misses of place (m), heading (rad), speed (m/s) that weigh alike
-PLAUSIBLE, TIMES = (
-    1.0,
-    3.0,
-)  # squared miss, and times the least one, up to which a friction is thought possible
+# misses of place (m), heading (rad) and speed (m/s) that weigh alike
+SCALES = np.array([0.01, 0.01, 0.05, 0.05])
+# a friction is thought possible up to this squared miss, and so many times the least one
+PLAUSIBLE, TIMES = 1.0, 3.0
 
 
 class Foresight:
@@ -58,6 +55,11 @@ class Foresight:
         ]
         self._misses = np.zeros(len(FRICTIONS))
 
+    @property
+    def likely(self) -> tuple[float, float]:
+        """The one of FRICTIONS that explains best what was seen."""
+        return FRICTIONS[int(self._misses.argmin())]
+
     def learn(self, before: Array, timeline: Timeline, after: Array) -> None:
         """Take in one cycle: the state it began with and the state it ended with."""
         misses = np.full(len(FRICTIONS), math.inf)
@@ -73,7 +75,7 @@ class Foresight:
 
         Minus infinity where the model cannot go on.
         """
-        run = self._runs[int(self._misses.argmin()) if friction is None else friction]
+        run = self._runs[FRICTIONS.index(self.likely) if friction is None else friction]
         try:
             trajectory = run.run(timeline, state)
         except NoAnswerError:

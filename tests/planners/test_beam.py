@@ -1,0 +1,40 @@
+"""The beam, and what it takes for nearness to the goal."""
+
+import numpy as np
+from planner_rooms import maze_of
+
+from planners.plan.solve import BEAM, LatticeSolver
+from planners.search.ahead import MOST_GAIN, remaining
+
+THIN_M = 0.006
+
+
+def serpentine(lanes):
+    """Return lanes of 0.4 m with thin walls between; the way back and forth is long."""
+    walls = []
+    for k in range(1, lanes):
+        begin = 0.0 if k % 2 else 0.4
+        walls.append((begin, 0.4 * k, begin + 2.0, 0.4 * k + THIN_M))
+    return maze_of((0, 0, 2.4, 0.4 * lanes), (0.3, 0.2, 0.0), (1.2, 0.4 * lanes - 0.2, 0.1), walls)
+
+
+def test_a_head_across_a_wall_promises_little(problem_in):
+    problem = problem_in(serpentine(3))
+    here = np.array([0.8, 0.34, np.pi / 2])
+    middle = float(problem.to_goal.at(here[:2]))
+    head = float(problem.to_goal.at(here[:2] + [0.0, problem.robot.length_m / 2]))
+    gain = MOST_GAIN * problem.robot.length_m / 2 / problem.tariff.top_speed_m_s
+    assert head < middle - 1.5 * gain, "the head is across the wall, far on the way"
+    gaits = problem.motion.size
+    ends = np.tile(here, (gaits, 1)) - np.stack(
+        [0 * problem.motion.course[:-1]] * 2 + [problem.motion.course[:-1]], axis=1
+    )
+    left = remaining(problem, ends, np.full(gaits, problem.tariff.top_speed_m_s))
+    assert np.all(left > middle - gain)
+
+
+def test_the_beam_comes_through_lanes_with_thin_walls(problem_in):
+    told = []
+    result = LatticeSolver(problem_in(serpentine(4)), beams=(BEAM,), tell=told.append).run()
+    assert result.status == "solved"
+    assert not any("beam died" in line for line in told)

@@ -1,0 +1,62 @@
+"""What the driver foresees, and what it learns of friction on the way."""
+
+import pytest
+from planner_rooms import corridor
+
+from planners.drive.foresight import FRICTIONS, Foresight
+from planners.motion.robots import undelayed
+from srs_opt.simulate.integrate import Integrator
+from srs_opt.simulate.rosenbrock import BODY_STATES
+from srs_opt.simulate.timeline import Timeline
+
+
+def driven(problem, true_robot, cycles=4):
+    """Return the foresight after some cycles of the fast gait on another robot, the cycle and the state."""
+    foresight = Foresight(problem)
+    run = Integrator(undelayed(true_robot), "complex")
+    gait = problem.gaits["fast"].gait
+    cycle = Timeline.of_gait(gait, gait.period_s)
+    state = run.rest(problem.start.x, problem.start.y, problem.start.heading)
+    for _ in range(cycles):
+        before, state = state, run.run(cycle, state).final
+        foresight.learn(as_planned(problem, before), cycle, as_planned(problem, state))
+    return foresight, cycle, as_planned(problem, state)
+
+
+def as_planned(problem, state):
+    planned = problem.run.rest()
+    size = BODY_STATES + 2 * problem.robot.segments
+    planned[:6], planned[BODY_STATES:size] = state[:6], state[BODY_STATES:size]
+    return planned
+
+
+def test_unknown_friction_is_any(problem_in):
+    problem = problem_in(corridor(0.2, 3.0))
+    foresight = Foresight(problem)
+    gait = problem.gaits["fast"].gait
+    ahead = Timeline.of_gait(gait, 3 * gait.period_s)
+    start = problem.start
+    state = problem.run.rest(start.x, start.y + 0.02, 0.15)
+    rooms = [foresight.room_m(state, ahead, k) for k in range(len(FRICTIONS))]
+    assert max(rooms) - min(rooms) > 1e-4
+    assert foresight.least_room_m(state, ahead) == pytest.approx(min(rooms), abs=1e-12)
+
+
+def test_the_planned_robot_is_recognized(problem_in, robot):
+    foresight, cycle, state = driven(problem_in(corridor(0.3, 3.0)), robot)
+    assert foresight.likely == (1.0, 1.0)
+    assert foresight.least_room_m(state, cycle) == foresight.room_m(state, cycle)
+
+
+@pytest.mark.parametrize(("along", "across"), [(0.8, 0.8), (1.2, 1.2), (1.5, 1.0)])
+def test_other_friction_is_recognized(problem_in, robot, along, across):
+    other = robot.with_values(
+        friction_tangential=along * robot.friction_tangential, friction_normal=across * robot.friction_normal
+    )
+    assert driven(problem_in(corridor(0.3, 3.0)), other)[0].likely == (along, across)
+
+
+def test_a_hose_is_felt_along_the_wheels(problem_in, robot):
+    hosed = robot.with_values(effects=[{"name": "tether_drag", "force_n": 0.05}])
+    along, across = driven(problem_in(corridor(0.3, 3.0)), hosed)[0].likely
+    assert along > 1 and across == 1
