@@ -19,22 +19,15 @@ def workers_deaf_to_interrupts() -> Iterator[None]:
     if not hasattr(signal, "pthread_sigmask"):  # Windows
         yield
         return
-    _start_trackers()
+    from multiprocessing import resource_tracker  # here: every command imports this module
+
+    # it watches over what workers share, and when it starts inside the block it ends the blocking
+    resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-def _start_trackers() -> None:
-    """Start the processes that watch over shared resources: when they start, they unblock SIGINT here."""
-    from multiprocessing import resource_tracker
-
-    from joblib.externals.loky.backend import resource_tracker as loky_tracker
-
-    resource_tracker.ensure_running()
-    loky_tracker.ensure_running()
 
 
 @contextlib.contextmanager

@@ -148,6 +148,9 @@ def _backend(jobs: int, cluster: str | None) -> Iterator[Any]:
     import joblib
 
     if cluster is None:
+        from joblib.externals.loky.backend import resource_tracker
+
+        resource_tracker.ensure_running()  # it, too, ends the blocking of interrupts when it starts
         with joblib.parallel_config("loky", n_jobs=jobs, inner_max_num_threads=1):
             yield
         return
