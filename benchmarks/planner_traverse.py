@@ -128,14 +128,18 @@ def compare(
 
 def shorter(ours: list[float | None], others: list[float | None]) -> float:
     """Return by what share our times are shorter, in the median over mazes that both do."""
-    ratios = [a / b for a, b in zip(ours, others) if a is not None and b is not None]
+    ratios = [a / b for a, b in _both(ours, others)]
     return 1 - float(np.median(ratios)) if ratios else float("nan")
 
 
 def shorter_together(ours: list[float | None], others: list[float | None]) -> float:
     """Return by what share the mazes that both do take us less time in all."""
-    both = [(a, b) for a, b in zip(ours, others) if a is not None and b is not None]
+    both = _both(ours, others)
     return 1 - sum(a for a, _ in both) / sum(b for _, b in both) if both else float("nan")
+
+
+def _both(ours: list[float | None], others: list[float | None]) -> list[tuple[float, float]]:
+    return [(a, b) for a, b in zip(ours, others) if a is not None and b is not None]
 
 
 def section(

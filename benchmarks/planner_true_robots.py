@@ -8,6 +8,7 @@ less or more friction, drag a hose of 35 mN along, or have a segment that always
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -16,30 +17,27 @@ from benchmarks.planner_mazes import CELLS_M, LIMIT_S, MARGIN_M, NODES, contest_
 from benchmarks.section import Section
 from benchmarks.stored import gather, stored_rows, study_parser
 from planners.drive.execute import execute
+from planners.motion.robots import with_friction_times
 from planners.plan.solve import solve_with_lattice
 from planners.search.problem import Problem
 from srs_opt.robot import Robot
 
 NAME = "planner_true_robots"
-TRUE = {
-    "as planned": {},
-    "friction 20 % less": {"friction": 0.8},
-    "friction 20 % more": {"friction": 1.2},
-    "a hose of 35 mN": {"effects": [{"name": "tether_drag", "force_n": 0.035}]},
-    "segment 2 bent by 1/m": {"effects": [{"name": "segment_bias", "bias": 1.0, "segment": 2}]},
-}
 Row = dict[str, Any]
 
 
-def true_robot(planned: Robot, kind: str) -> Robot:
-    """Return the robot that drives."""
-    changes = dict(TRUE[kind])
-    factor = changes.pop("friction", 1.0)
-    return planned.with_values(
-        friction_tangential=factor * planned.friction_tangential,
-        friction_normal=factor * planned.friction_normal,
-        **changes,
-    )
+def _with_effect(**effect: Any) -> Callable[[Robot], Robot]:
+    return lambda planned: planned.with_values(effects=[effect])
+
+
+# what makes the robot that drives of the planned one
+TRUE: dict[str, Callable[[Robot], Robot]] = {
+    "as planned": lambda planned: planned,
+    "friction 20 % less": lambda planned: with_friction_times(planned, 0.8, 0.8),
+    "friction 20 % more": lambda planned: with_friction_times(planned, 1.2, 1.2),
+    "a hose of 35 mN": _with_effect(name="tether_drag", force_n=0.035),
+    "segment 2 bent by 1/m": _with_effect(name="segment_bias", bias=1.0, segment=2),
+}
 
 
 def attempt(kind: str, seed: int) -> Row:
@@ -49,7 +47,7 @@ def attempt(kind: str, seed: int) -> Row:
     plan = solve_with_lattice(problem, time_limit_s=LIMIT_S, max_nodes=NODES).plan
     if plan is None:
         return {"robot": kind, "maze": problem.maze.name, "planned": False}
-    driven = execute(problem, plan, true_robot(robot, kind))
+    driven = execute(problem, plan, TRUE[kind](robot))
     return {
         "robot": kind,
         "maze": problem.maze.name,

@@ -23,7 +23,6 @@ from srs_opt.errors import InputError, NoAnswerError
 from srs_opt.model.parameters import valve_delay_s
 from srs_opt.robot import Robot
 from srs_opt.simulate.integrate import Integrator
-from srs_opt.simulate.rosenbrock import BODY_STATES
 from srs_opt.simulate.timeline import Timeline
 
 Array = NDArray[np.float64]
@@ -127,7 +126,9 @@ class _Drive:
 
     def _follow(self, plan: Plan) -> None:
         self.plan, self.reference = plan, reference_of(self.problem, plan)
-        self.ends = np.array([self._as_planned()[:4], *(state[:4] for state in plan.certificate.states)])
+        self.ends = np.array(
+            [self.problem.as_planned(self.state)[:4], *(state[:4] for state in plan.certificate.states)]
+        )
         self.gaits_before = np.array([self.before, *plan.gaits])
         self.node = self.idle = 0
 
@@ -168,10 +169,10 @@ class _Drive:
         forbids it.
         """
         where = Where(self.state[:3].copy(), self.before, float(self.state[3]))
-        state = self._as_planned()
+        state = self.problem.as_planned(self.state)
         planned = self._gait_by_plan(state)
-        enough_m = self.problem.margin_m / 2
-        if planned is not None and self._room_m(state, planned, surely=True) > enough_m:
+        enough_m = self.foresight.enough_m
+        if planned is not None and self._room_m(state, planned) > enough_m:
             return by_plan(self.problem, where, self.learned, planned)
         tried: list[Choice] = []
         second, most_m = None, LEAST_ROOM_M
@@ -181,20 +182,17 @@ class _Drive:
             tried.append(choice)
             if choice.clearance_m < STOP_CLEARANCE_M:
                 break
-            if self._room_m(state, choice.gait) > 0:
-                least_m = self._room_m(state, choice.gait, surely=True)
-                if least_m > enough_m:
-                    return choice
-                if least_m > most_m:
-                    second, most_m = choice, least_m
+            room_m = self._room_m(state, choice.gait)
+            if room_m > enough_m:
+                return choice
+            if room_m > most_m:
+                second, most_m = choice, room_m
         return second or replace(tried[0], clearance_m=-math.inf)
 
-    def _room_m(self, state: Array, gait: int, *, surely: bool = False) -> float:
-        """Return the clearance over a cycle: on the planned robot, or the least with any friction."""
+    def _room_m(self, state: Array, gait: int) -> float:
+        """Return the least clearance over a cycle with any friction that the robot may have."""
         played = self.problem.gaits.gaits[gait].gait
-        cycle = Timeline.of_gait(played, played.period_s)
-        foresee = self.foresight.least_room_m if surely else self.foresight.room_m
-        return foresee(state, cycle)
+        return self.foresight.least_room_m(state, Timeline.of_gait(played, played.period_s), 0.0)
 
     def _gait_by_plan(self, state: Array) -> int | None:
         """Return the gait that the plan plays next, if the robot is as the plan has it after a cycle."""
@@ -213,7 +211,7 @@ class _Drive:
         try:
             result = solve_with_lattice(
                 relaxed,
-                root=Root(self._as_planned(), self.before, slack),
+                root=Root(self.problem.as_planned(self.state), self.before, slack),
                 time_limit_s=20.0,
                 max_nodes=REPLAN_CYCLES,
             )
@@ -224,18 +222,10 @@ class _Drive:
         self._follow(result.plan)
         return True
 
-    def _as_planned(self) -> Array:
-        """Return the state as the planned robot's model has it."""
-        n = self.problem.robot.segments
-        state = self.problem.run.rest()
-        state[:6] = self.state[:6]
-        state[BODY_STATES : BODY_STATES + 2 * n] = self.state[BODY_STATES : BODY_STATES + 2 * n]
-        return state
-
     def _cycle(self, index: int) -> str | None:
         """Play one cycle; return what ended the drive, if anything."""
         gait = self.problem.gaits.gaits[index].gait
-        begin, before = self.state[:3].copy(), self._as_planned()
+        begin, before = self.state[:3].copy(), self.problem.as_planned(self.state)
         cycle = Timeline.of_gait(gait, gait.period_s)
         trajectory = self.run.run(cycle, self.state)
         arrived = self.watch.look(trajectory.time_s, trajectory.pose, trajectory.kappa)
@@ -246,7 +236,7 @@ class _Drive:
             return "contact"
         if arrived:
             return "arrived"
-        self.foresight.learn(before, cycle, self._as_planned())
+        self.foresight.learn(before, cycle, self.problem.as_planned(self.state))
         c, s = math.cos(begin[2]), math.sin(begin[2])
         dx, dy, turn = self.state[:3] - begin
         observed = np.array([c * dx + s * dy, c * dy - s * dx, turn])
@@ -264,7 +254,7 @@ class _Drive:
     def _halt(self) -> bool:
         """Bring the robot to rest where there is room for it; return whether it came to no harm."""
         self.halts += 1
-        trajectory = self.run.run(halt(self.foresight, self._as_planned()), self.state)
+        trajectory = self.run.run(halt(self.foresight, self.problem.as_planned(self.state)), self.state)
         self.watch.look(trajectory.time_s, trajectory.pose, trajectory.kappa, ends=False)
         self.state = trajectory.final
         self.before = self.problem.motion.rest

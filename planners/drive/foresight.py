@@ -8,17 +8,18 @@ of them.
 from __future__ import annotations
 
 import math
-from contextlib import suppress
 
 import numpy as np
 from numpy.typing import NDArray
 
 from planners.drive.contact import BodyWatch
-from planners.motion.robots import undelayed
+from planners.motion.robots import undelayed, with_friction_times
 from planners.search.problem import Problem
 from srs_opt.errors import NoAnswerError
 from srs_opt.orbit.steady import integrator
+from srs_opt.simulate.integrate import Trajectory
 from srs_opt.simulate.timeline import Timeline
+from srs_opt.simulate.together import together
 
 Array = NDArray[np.float64]
 # friction along and across the wheels, over the planned robot's; a hose that drags is felt along the wheels
@@ -28,6 +29,7 @@ FADING = 0.7  # of what earlier cycles told, per cycle
 SCALES = np.array([0.01, 0.01, 0.05, 0.05])
 # a friction is thought possible up to this squared miss, and so many times the least one
 PLAUSIBLE, TIMES = 1.0, 3.0
+ENOUGH_MARGINS = 0.5  # of the margin: what leaves so much room is good enough
 
 
 class Foresight:
@@ -42,18 +44,15 @@ class Foresight:
         self.problem = problem
         robot = problem.robot
         self._runs = [
-            integrator(
-                undelayed(
-                    robot.with_values(
-                        friction_tangential=along * robot.friction_tangential,
-                        friction_normal=across * robot.friction_normal,
-                    )
-                ),
-                problem.gaits.model,
-            )
-            for along, across in FRICTIONS
+            integrator(undelayed(with_friction_times(robot, *friction)), problem.gaits.model)
+            for friction in FRICTIONS
         ]
         self._misses = np.zeros(len(FRICTIONS))
+
+    @property
+    def enough_m(self) -> float:
+        """Clearance that is good enough."""
+        return ENOUGH_MARGINS * self.problem.margin_m
 
     @property
     def likely(self) -> tuple[float, float]:
@@ -62,12 +61,8 @@ class Foresight:
 
     def learn(self, before: Array, timeline: Timeline, after: Array) -> None:
         """Take in one cycle: the state it began with and the state it ended with."""
-        misses = np.full(len(FRICTIONS), math.inf)
-        for k, run in enumerate(self._runs):
-            with suppress(NoAnswerError):
-                off = run.run(timeline, before).final[:4] - after[:4]
-                off[2] = (off[2] + math.pi) % (2 * math.pi) - math.pi
-                misses[k] = ((off / SCALES) ** 2).sum()
+        foreseen = together([run.travel(timeline, before) for run in self._runs])
+        misses = [_miss(outcome, after) for outcome in foreseen]
         self._misses = FADING * self._misses + misses
 
     def room_m(self, state: Array, timeline: Timeline, friction: int | None = None) -> float:
@@ -94,3 +89,12 @@ class Foresight:
             if least_m <= worth_m:
                 break
         return least_m
+
+
+def _miss(foreseen: Trajectory | NoAnswerError, after: Array) -> float:
+    """Return how far a cycle ends from where it did, squared; infinity where the model could not go on."""
+    if isinstance(foreseen, NoAnswerError):
+        return math.inf
+    off = foreseen.final[:4] - after[:4]
+    off[2] = (off[2] + math.pi) % (2 * math.pi) - math.pi
+    return float(((off / SCALES) ** 2).sum())

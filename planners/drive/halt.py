@@ -12,7 +12,6 @@ from planners.drive.foresight import Foresight
 from srs_opt.simulate.timeline import Timeline
 
 COAST_S = 1.5  # watched after the valves have been vented
-ENOUGH_MARGINS = 0.5  # of the margin: what leaves so much room is good enough
 
 
 def halt(foresight: Foresight, state: NDArray[np.float64]) -> Timeline:
@@ -32,7 +31,7 @@ def halt(foresight: Foresight, state: NDArray[np.float64]) -> Timeline:
     steers = [e.gait for e in problem.gaits.gaits if (e.speed_m_s > 0) == forward]
     # braking for one cycle, then for two, then steering away: what is looked at last goes farthest
     for gaits, cycles in ((brakes, 1), (brakes, 2), (steers, 1)):
-        if most_m >= ENOUGH_MARGINS * problem.margin_m:
+        if most_m >= foresight.enough_m:
             break
         for gait in gaits:
             way = Timeline.join([Timeline.of_gait(gait, cycles * gait.period_s), vent])

@@ -6,6 +6,13 @@ from srs_opt.model.effects import all_effects
 from srs_opt.robot import Robot
 
 
+def with_friction_times(robot: Robot, along: float, across: float) -> Robot:
+    """Return the robot with friction along and across the wheels so many times as large."""
+    return robot.with_values(
+        friction_tangential=along * robot.friction_tangential, friction_normal=across * robot.friction_normal
+    )
+
+
 def undelayed(robot: Robot) -> Robot:
     """Return the robot with valves that follow at once; a constant delay only shifts a plan in time."""
     effects = [dict(spec) for spec in robot.effects if all_effects()[spec["name"]].delay is None]

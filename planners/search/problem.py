@@ -153,6 +153,13 @@ class Problem:
             cycles.append(_Plan(mesh, valve, p, low, (at - time[low]) / mesh.h_s[low]))
         return cycles
 
+    def as_planned(self, state: Array) -> Array:
+        """Return another robot's state as the planned robot's model has it: place, speed and curvature."""
+        planned, known = self.run.rest(), BODY_STATES + 2 * self.robot.segments
+        planned[:6] = state[:6]
+        planned[BODY_STATES:known] = state[BODY_STATES:known]
+        return planned
+
     def simulate(self, state: Array, gait: int) -> Cycle:
         """Return one cycle of a gait from a state of the dynamic model."""
         (cycle,) = self.simulate_all([(state, gait)])

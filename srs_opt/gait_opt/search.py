@@ -102,7 +102,8 @@ def search(
     """
     begun = time.perf_counter()
     if warm is None and problem.goal.speed_m_s:
-        _refuse_out_of_reach(problem, problem.goal.speed_m_s, starts, seed, where)
+        say("the fastest straight gait first: is the wanted speed within reach?")
+        _refuse_out_of_reach(problem, problem.goal.speed_m_s, starts, seed, say, where)
     own = max(r.friction_speed_m_s for r in problem.robots)
     if warm is None:
         candidates = starting_gaits(problem, starts, seed)
@@ -147,11 +148,11 @@ def search(
 
 
 def _refuse_out_of_reach(
-    problem: CycleProblem, speed_m_s: float, starts: int, seed: int, where: Where
+    problem: CycleProblem, speed_m_s: float, starts: int, seed: int, say: Say, where: Where
 ) -> None:
     """Refuse a speed that even the fastest straight gait does not make, before the long search for it."""
     only_fast = replace(problem, robots=problem.robots[:1], goal=Goal("speed"))
-    fastest = search(only_fast, starts, seed, where=where)
+    fastest = search(only_fast, starts, seed, say, where=where)
     if fastest.interrupted:
         raise KeyboardInterrupt
     if speed_m_s > (1 + _BEYOND) * fastest.certificate.speed_m_s:

@@ -26,9 +26,8 @@ def test_a_head_across_a_wall_promises_little(problem_in):
     gain = MOST_GAIN * problem.robot.length_m / 2 / problem.tariff.top_speed_m_s
     assert head < middle - 1.5 * gain, "the head is across the wall, far on the way"
     gaits = problem.motion.size
-    ends = np.tile(here, (gaits, 1)) - np.stack(
-        [0 * problem.motion.course[:-1]] * 2 + [problem.motion.course[:-1]], axis=1
-    )
+    ends = np.tile(here, (gaits, 1))
+    ends[:, 2] -= problem.motion.course[:-1]
     left = remaining(problem, ends, np.full(gaits, problem.tariff.top_speed_m_s))
     assert np.all(left > middle - gain)
 

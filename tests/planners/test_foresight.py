@@ -4,9 +4,8 @@ import pytest
 from planner_rooms import corridor
 
 from planners.drive.foresight import FRICTIONS, Foresight
-from planners.motion.robots import undelayed
+from planners.motion.robots import undelayed, with_friction_times
 from srs_opt.simulate.integrate import Integrator
-from srs_opt.simulate.rosenbrock import BODY_STATES
 from srs_opt.simulate.timeline import Timeline
 
 
@@ -19,15 +18,8 @@ def driven(problem, true_robot, cycles=4):
     state = run.rest(problem.start.x, problem.start.y, problem.start.heading)
     for _ in range(cycles):
         before, state = state, run.run(cycle, state).final
-        foresight.learn(as_planned(problem, before), cycle, as_planned(problem, state))
-    return foresight, cycle, as_planned(problem, state)
-
-
-def as_planned(problem, state):
-    planned = problem.run.rest()
-    size = BODY_STATES + 2 * problem.robot.segments
-    planned[:6], planned[BODY_STATES:size] = state[:6], state[BODY_STATES:size]
-    return planned
+        foresight.learn(problem.as_planned(before), cycle, problem.as_planned(state))
+    return foresight, cycle, problem.as_planned(state)
 
 
 def test_unknown_friction_is_any(problem_in):
@@ -50,9 +42,7 @@ def test_the_planned_robot_is_recognized(problem_in, robot):
 
 @pytest.mark.parametrize(("along", "across"), [(0.8, 0.8), (1.2, 1.2), (1.5, 1.0)])
 def test_other_friction_is_recognized(problem_in, robot, along, across):
-    other = robot.with_values(
-        friction_tangential=along * robot.friction_tangential, friction_normal=across * robot.friction_normal
-    )
+    other = with_friction_times(robot, along, across)
     assert driven(problem_in(corridor(0.3, 3.0)), other)[0].likely == (along, across)
 
 
