@@ -28,6 +28,7 @@ from planners.search.clearance import BodyClearance
 from planners.search.problem import Problem
 from srs_opt.gait import Gait
 from srs_opt.gait_opt.collocation.problem import CycleProblem
+from srs_opt.gait_opt.companions import leaned_family
 from srs_opt.gait_opt.goal import Goal, Limits
 from srs_opt.gait_opt.search import search
 from srs_opt.robot import Robot
@@ -38,7 +39,6 @@ from virtual_lab.truth import Truth
 
 EFFECTS = ("curvature_bias", "gap_bending", "tether_drag")
 MARGIN_M = 0.01
-LAG_RAD = 0.9
 FRAMES = 40  # per cycle
 SETTLED, MEASURED = 10, 10  # cycles
 ALONG = 12  # points of the body's centre line between two links
@@ -120,10 +120,8 @@ def robots_of(effect: str, folder: Path) -> tuple[Truth, dict[str, Robot], str]:
 
 
 def planned(robot: Robot, gait: Gait, maze_file: Path) -> tuple[Problem, Plan | None]:
-    """Plan through a maze with uniform waves of the fastest gait's frequency and pressure."""
-    from benchmarks.planner_traverse import grid_family
-
-    table = grid_family(robot, gait.frequency_hz, gait.pressure_kpa, LAG_RAD)
+    """Plan through a maze with the fastest gait and its companions."""
+    table = leaned_family(robot, gait)
     problem = Problem(robot, table, load_motion(robot, table), load_maze(str(maze_file)), MARGIN_M)
     return problem, solve_with_lattice(problem, max_nodes=20_000, time_limit_s=120.0).plan
 

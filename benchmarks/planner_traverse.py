@@ -11,10 +11,8 @@ in the maze at hand.
 from __future__ import annotations
 
 import argparse
-import math
 import random
 import sys
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -30,64 +28,29 @@ from planners.motion.store import load_motion
 from planners.motion.table import MotionTable
 from planners.plan.solve import BEAM, BEAMS, LatticeSolver
 from planners.search.problem import Problem
-from srs_opt.errors import NoAnswerError
 from srs_opt.files import write_json
-from srs_opt.gait import Gait, Wave
-from srs_opt.gait_opt.aim import end_for_end, in_step, leaned
 from srs_opt.gait_opt.catalogue import default_table
-from srs_opt.gait_opt.table import GaitTable, TableGait, load_table
-from srs_opt.orbit.steady import steady_gait
+from srs_opt.gait_opt.companions import leaned_family, wave_family
+from srs_opt.gait_opt.table import GaitTable, load_table
 from srs_opt.robot import Robot, wpi_srs
 
 MARGIN_M = 0.005
-TICK_S = 0.001
-OFFSETS = (0.0, 0.15, 0.3, 0.45, 0.6, 0.7, 0.8, 0.9)
 # frequency Hz, pressure kPa, lag rad: from slim to strong
 GRID = ((2.0, 26.0, 1.0), (2.0, 30.0, 0.9), (2.0, 40.0, 0.9), (2.0, 48.0, 0.9), (2.0, 55.0, 0.9))
 QUICK_GRID = GRID[2:3]
 OURS = ("first", "u_turn", "slalom", "rooms", "narrow", "blocks", "door 72", "door 66", "door 60")
 MAZES = (*OURS, *(f"cells {seed}" for seed in range(8)))
 OWN = "its own"
-SLOWEST_M_S, STRAIGHT_RAD_S = 0.03, 0.02
+STRAIGHT_RAD_S = 0.02
 LIMIT_NODES, LIMIT_S = 6000, 60.0
 
 Ride = tuple[GaitTable, MotionTable]
 
 
-def family(robot: Robot, leaning: Callable[[float], Gait]) -> GaitTable:
-    """Return a straight gait with its companions, both ways; `leaning` gives the gait for an offset."""
-    entries = []
-    for offset in [sign * size for size in OFFSETS for sign in ((1, -1) if size else (1,))]:
-        for way, turned in (("", _unchanged), (" back", end_for_end)):
-            try:
-                orbit = steady_gait(robot, in_step(turned(leaning(offset)), TICK_S))
-            except NoAnswerError:
-                continue
-            entry = TableGait.of_orbit(f"{offset:+g}{way}", orbit)
-            if abs(entry.speed_m_s) > SLOWEST_M_S:
-                entries.append(entry)
-    return GaitTable(robot.name, robot.fingerprint(), "complex", tuple(entries))
-
-
-def _unchanged(gait: Gait) -> Gait:
-    return gait
-
-
 def own_family(robot: Robot, table: GaitTable) -> GaitTable:
     """Return the family of the table's fastest straight gait."""
     straight = [e for e in table.gaits if abs(e.turn_rate_rad_s) < STRAIGHT_RAD_S]
-    gait = max(straight, key=lambda e: e.speed_m_s).gait
-    # an offset makes a wave's on-intervals longer by asin(offset)/pi of the cycle
-    return family(robot, lambda offset: leaned(gait, math.asin(offset) / math.pi))
-
-
-def grid_family(robot: Robot, frequency_hz: float, pressure_kpa: float, lag_rad: float) -> GaitTable:
-    """Return the family of a uniform wave."""
-
-    def leaning(offset: float) -> Gait:
-        return Wave.uniform(robot.segments, frequency_hz, pressure_kpa, lag_rad, offset).gait()
-
-    return family(robot, leaning)
+    return leaned_family(robot, max(straight, key=lambda e: e.speed_m_s).gait)
 
 
 def maze_named(name: str, size: RobotSize) -> Maze:
@@ -115,7 +78,7 @@ def compare(
     """Return the times of the table and of each family, maze by maze."""
     robot = wpi_srs()
     tables = {"whole table": table, OWN: own_family(robot, table)}
-    tables |= {f"{p:g} kPa, {f:g} Hz, {lag:g} rad": grid_family(robot, f, p, lag) for f, p, lag in grid}
+    tables |= {f"{p:g} kPa, {f:g} Hz, {lag:g} rad": wave_family(robot, f, p, lag) for f, p, lag in grid}
     rides = {name: (gaits, load_motion(robot, gaits)) for name, gaits in tables.items()}
     size = RobotSize(robot.length_m, robot.body_width_m / 2, MARGIN_M)
     rows = []

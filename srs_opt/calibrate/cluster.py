@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from srs_opt.calibrate.coordinates import Coordinate
-from srs_opt.calibrate.experiment import Experiment, Extra, Point, Slopes
+from srs_opt.calibrate.experiment import Experiment, Request, Slopes
 from srs_opt.calibrate.gram import TrialGram
 from srs_opt.calibrate.model import Model
 from srs_opt.calibrate.nominal import Meshes
@@ -52,27 +52,21 @@ class ClusterCrew:
         self.experiment.crew = None
         self._client.close()
 
-    def grams(
-        self,
-        trials: Sequence[Trial],
-        point: Point,
-        coordinates: Sequence[Coordinate],
-        extra: Extra | None,
-        stale: bool = False,
-    ) -> dict[str, TrialGram]:
+    def grams(self, trials: Sequence[Trial], request: Request) -> dict[str, TrialGram]:
         """Return the Gram matrices of `trials`.
 
         Raises
         ------
         NoAnswerError
-            If a trial cannot be simulated at `point`.
+            If a trial cannot be simulated at the point.
         """
         runs, slopes = self.experiment.runs, self.experiment.slopes
         tasks = []
         for share in chunks(trials, SHARE):
-            memory = {t.name: (runs[t.name].meshes, slopes.get(t.name) if stale else None) for t in share}
-            asked = (self._setup, tuple(share), memory, point, tuple(coordinates), extra)
-            tasks.append(self._client.submit(_linearise, *asked, pure=False))
+            known = slopes if request.stale else {}
+            memory = {t.name: (runs[t.name].meshes, known.get(t.name)) for t in share}
+            task = self._client.submit(_linearise, self._setup, tuple(share), memory, request, pure=False)
+            tasks.append(task)
         found: dict[str, TrialGram] = {}
         failure: str | None = None
         for grams, memory in self._client.gather(tasks):
@@ -93,9 +87,7 @@ def _linearise(
     setup: Setup,
     trials: tuple[Trial, ...],
     memory: Mapping[str, Memory],
-    point: Point,
-    coordinates: tuple[Coordinate, ...],
-    extra: Extra | None,
+    request: Request,
 ) -> tuple[dict[str, TrialGram] | str, dict[str, Memory]]:
     """Return the Gram matrices, or why there are none, and what to go on with; runs on a worker.
 
@@ -111,7 +103,7 @@ def _linearise(
             experiment.slopes[t.name], stale = slopes, True
     grams: dict[str, TrialGram] | str
     try:
-        grams = experiment.own_grams(trials, point, coordinates, extra, stale)
+        grams = experiment.own_grams(trials, replace(request, stale=stale))
     except NoAnswerError as error:
         grams = str(error)
     back = {} if stale else experiment.slopes

@@ -9,25 +9,27 @@ from contextlib import AbstractContextManager, nullcontext
 from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING, Any
 
-from srs_opt.calibrate.coordinates import Coordinate
 from srs_opt.calibrate.gram import TrialGram
 from srs_opt.errors import NoAnswerError
 from srs_opt.measurement.records import Trial
 from srs_opt.processes import workers_deaf_to_interrupts
 
 if TYPE_CHECKING:
-    from srs_opt.calibrate.experiment import Experiment, Extra, Point
+    from srs_opt.calibrate.experiment import Experiment, Request
 
 
 def helped(
-    experiment: Experiment, jobs: int = 1, cluster: str | None = None
+    experiment: Experiment,
+    jobs: int = 1,
+    cluster: str | None = None,
+    groups: Sequence[Sequence[Trial]] = (),
 ) -> AbstractContextManager[object]:
     """Return a context in which `jobs` processes, or the cluster at that address, share the trials."""
     if cluster is not None:
         from srs_opt.calibrate.cluster import ClusterCrew
 
         return ClusterCrew(experiment, cluster)
-    return Crew(experiment, jobs) if jobs > 1 else nullcontext()
+    return Crew(experiment, jobs, groups) if jobs > 1 else nullcontext()
 
 
 class Crew:
@@ -39,12 +41,13 @@ class Crew:
         Its model, trials and noise go to the workers.
     jobs : int
         Number of processes, the calling one included.
+    groups : sequence of sequences of Trial
+        Trials that are asked for together, the most important first; default: all at once.
     """
 
-    def __init__(self, experiment: Experiment, jobs: int) -> None:
+    def __init__(self, experiment: Experiment, jobs: int, groups: Sequence[Sequence[Trial]] = ()) -> None:
         self.experiment = experiment
-        order = sorted(experiment.trials, key=lambda t: -t.time_s[-1] * max(t.frequency_hz, 0.5))
-        shares = [order[k::jobs] for k in range(jobs)]
+        shares = fair_shares(groups or (experiment.trials,), jobs)
         self.own = {t.name for t in shares[0]}
         self._members: list[tuple[Any, Connection, set[str]]] = []
         context = multiprocessing.get_context("spawn")
@@ -75,32 +78,25 @@ class Crew:
             process.join(timeout=10)
             connection.close()
 
-    def grams(
-        self,
-        trials: Sequence[Trial],
-        point: Point,
-        coordinates: Sequence[Coordinate],
-        extra: Extra | None,
-        stale: bool = False,
-    ) -> dict[str, TrialGram]:
+    def grams(self, trials: Sequence[Trial], request: Request) -> dict[str, TrialGram]:
         """Return the Gram matrices of `trials`, every process working on its share.
 
         Raises
         ------
         NoAnswerError
-            If a trial cannot be simulated at `point`.
+            If a trial cannot be simulated at the point.
         """
         asked = []
         for _, connection, share in self._members:
             names = [t.name for t in trials if t.name in share]
             if names:
-                connection.send((names, point, tuple(coordinates), extra, stale))
+                connection.send((names, request))
                 asked.append(connection)
         found: dict[str, TrialGram] = {}
         failure: NoAnswerError | None = None
         try:
             own = [t for t in trials if t.name in self.own]
-            found.update(self.experiment.own_grams(own, point, coordinates, extra, stale))
+            found.update(self.experiment.own_grams(own, request))
         except NoAnswerError as error:
             failure = error
         for connection in asked:
@@ -112,6 +108,24 @@ class Crew:
         if failure is not None:
             raise failure
         return {t.name: found[t.name] for t in trials}
+
+
+def fair_shares(groups: Sequence[Sequence[Trial]], jobs: int) -> list[list[Trial]]:
+    """Return the trials of every process: of each group, which is asked for together, as many to all.
+
+    Who gets one more of a group gets one less of a later one.
+    """
+    shares: list[list[Trial]] = [[] for _ in range(jobs)]
+    load = [0.0] * jobs
+    for group in groups:
+        counts = [0] * jobs
+        for trial in sorted(group, key=lambda t: -t.frequency_hz):
+            fewest = min(counts)
+            k = min((k for k in range(jobs) if counts[k] == fewest), key=lambda k: load[k])
+            shares[k].append(trial)
+            counts[k] += 1
+            load[k] += float(trial.time_s[-1])
+    return shares
 
 
 def _serve(
@@ -132,10 +146,9 @@ def _serve(
     # a parent that has gone, between two requests or in the middle of one, is no failure of this process
     with contextlib.suppress(EOFError, OSError, KeyboardInterrupt):
         while (request := connection.recv()) is not None:
-            names, point, coordinates, extra, stale = request
+            names, wanted = request
             try:
-                share = [known[n] for n in names]
-                answer: object = experiment.own_grams(share, point, coordinates, extra, stale)
+                answer: object = experiment.own_grams([known[n] for n in names], wanted)
             except NoAnswerError as error:
                 answer = str(error)
             connection.send(answer)

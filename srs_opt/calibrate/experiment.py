@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from srs_opt.calibrate.crew import Crew
 
 AT_ONCE = 48  # trials whose motions are in memory together: enough to fill the lanes
+ROUGHER = 5.0  # times the tolerance, for fits whose misfit hides it
 MOST_KEPT = 2_000_000  # measured values up to which slopes and motions are kept: some 300 MB
 Extra = Callable[[Trial, Prediction], np.ndarray]
 Slopes = tuple[tuple[str, ...], np.ndarray]  # coordinates, and a trial's slopes (n, K) in single precision
@@ -51,6 +52,30 @@ class Point:
         for parameter, b in zip(SCATTER_SD, self.scatter.get(name, np.zeros(len(SCATTER_SD)))):
             own[parameter] = own.get(parameter, 0.0) + float(b)
         return own
+
+
+@dataclass(frozen=True)
+class Request:
+    """What is asked of the trials.
+
+    Attributes
+    ----------
+    point : Point
+    coordinates : tuple of Coordinate
+        By which the motions are derived; the scattering parameters are among them.
+    extra : callable, optional
+        Residual functions, as further columns.
+    stale : bool
+        Whether slopes of the last request for the same coordinates serve.
+    rough : bool
+        Whether the motions need not be better than a model can say that leaves a plain misfit.
+    """
+
+    point: Point
+    coordinates: tuple[Coordinate, ...]
+    extra: Extra | None = None
+    stale: bool = False
+    rough: bool = False
 
 
 class Experiment:
@@ -87,7 +112,7 @@ class Experiment:
         self.tolerance_m_s = tolerance_m_s or tolerance_for(count, sd_m)
         self.keeps = count <= MOST_KEPT if keeps is None else keeps
         self.slopes: dict[str, Slopes] = {}
-        self._motions: dict[str, tuple[dict[str, float], Nodes]] = {}
+        self._motions: dict[str, tuple[bool, dict[str, float], Nodes]] = {}
         self.scatter_sd = np.array(list(SCATTER_SD.values()))
         self.crew: Crew | ClusterCrew | None = None
 
@@ -102,6 +127,10 @@ class Experiment:
         nodes = self.runs[trial.name](point.of_trial(trial.name), tolerance_m_s or self.tolerance_m_s)
         return self._seen(trial, nodes, point, coordinates)
 
+    def predictions(self, trials: Sequence[Trial], point: Point) -> list[Prediction]:
+        """Return the predictions of several trials at `point`, simulated side by side."""
+        return [self._seen(t, nodes, point, ()) for t, nodes in zip(trials, self._simulated(trials, point))]
+
     def _seen(
         self, trial: Trial, nodes: Nodes, point: Point, coordinates: Sequence[Coordinate]
     ) -> Prediction:
@@ -115,62 +144,37 @@ class Experiment:
         assert track is not None
         return np.asarray(track - prediction.points)
 
-    def gram(
-        self,
-        trial: Trial,
-        point: Point,
-        coordinates: Sequence[Coordinate],
-        extra: Extra | None = None,
-    ) -> TrialGram:
-        """Return the trial's Gram matrix over `coordinates`, then the residual functions `extra`.
-
-        The coordinates must include the scattering parameters.
-        """
-        return self.own_grams((trial,), point, coordinates, extra)[trial.name]
-
-    def own_grams(
-        self,
-        trials: Sequence[Trial],
-        point: Point,
-        coordinates: Sequence[Coordinate],
-        extra: Extra | None = None,
-        stale: bool = False,
-    ) -> dict[str, TrialGram]:
+    def own_grams(self, trials: Sequence[Trial], request: Request) -> dict[str, TrialGram]:
         """Return the Gram matrices of `trials`, simulated side by side in this process."""
         found = {}
         for first in range(0, len(trials), AT_ONCE):
             some = trials[first : first + AT_ONCE]
-            for trial, nodes in zip(some, self._simulated(some, point)):
-                found[trial.name] = self._gram(trial, nodes, point, coordinates, extra, stale)
+            for trial, nodes in zip(some, self._simulated(some, request.point, rough=request.rough)):
+                found[trial.name] = self._gram(trial, nodes, request)
         return found
 
-    def _simulated(self, trials: Sequence[Trial], point: Point) -> list[Nodes]:
+    def _simulated(self, trials: Sequence[Trial], point: Point, *, rough: bool = False) -> list[Nodes]:
         """Return the trials' motions at `point`; one that was simulated there last is not simulated anew."""
         wanted = {t.name: {k: v for k, v in point.of_trial(t.name).items() if v != 0} for t in trials}
-        known = {n: self._motions[n][1] for n, v in wanted.items() if self._motions.get(n, ({},))[0] == v}
+        last = {n: self._motions.get(n) for n in wanted}
+        known = {n: m[2] for n, m in last.items() if m is not None and m[:2] == (rough, wanted[n])}
         names = [n for n in wanted if n not in known]
-        searches = [self.runs[n].search(point.of_trial(n), self.tolerance_m_s) for n in names]
+        tolerance = self.tolerance_m_s * (ROUGHER if rough else 1.0)
+        searches = [self.runs[n].search(point.of_trial(n), tolerance) for n in names]
         for name, nodes in zip(names, together(searches)):
             if isinstance(nodes, NoAnswerError):
                 raise nodes
             known[name] = nodes
             if self.keeps:
-                self._motions[name] = wanted[name], nodes
+                self._motions[name] = rough, wanted[name], nodes
         return [known[n] for n in wanted]
 
-    def _gram(
-        self,
-        trial: Trial,
-        nodes: Nodes,
-        point: Point,
-        coordinates: Sequence[Coordinate],
-        extra: Extra | None,
-        stale: bool,
-    ) -> TrialGram:
-        names = tuple(c.name for c in coordinates)
+    def _gram(self, trial: Trial, nodes: Nodes, request: Request) -> TrialGram:
+        point, extra = request.point, request.extra
+        names = tuple(c.name for c in request.coordinates)
         kept = self.slopes.get(trial.name)
-        stale = stale and kept is not None and kept[0] == names
-        prediction = self._seen(trial, nodes, point, () if stale else coordinates)
+        stale = request.stale and kept is not None and kept[0] == names
+        prediction = self._seen(trial, nodes, point, () if stale else request.coordinates)
         residual = self.residual(trial, prediction)
         if stale:
             assert kept is not None
@@ -194,18 +198,18 @@ class Experiment:
         extra: Extra | None = None,
         *,
         stale: bool = False,
+        rough: bool = False,
     ) -> dict[str, TrialGram]:
         """Return the Gram matrices of several trials.
 
         With `stale` the slopes may be those of the last request for the same coordinates, which costs a
-        third; the residuals are always those at `point`.
+        fifth; the residuals are always those at `point`. With `rough` motions are good enough for a model
+        that leaves a plain misfit.
         """
         chosen = self.trials if trials is None else trials
         stale = stale and self.keeps and extra is None
-        if self.crew is not None:
-            found = self.crew.grams(chosen, point, coordinates, extra, stale)
-        else:
-            found = self.own_grams(chosen, point, coordinates, extra, stale)
+        request = Request(point, tuple(coordinates), extra, stale, rough)
+        found = self.own_grams(chosen, request) if self.crew is None else self.crew.grams(chosen, request)
         if self.readings and found:
             further = next(iter(found.values())).raw.shape[0] - 1 - len(coordinates)
             found[NAME] = reading_gram(self.readings, point.values, coordinates, further)

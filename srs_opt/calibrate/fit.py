@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -13,12 +13,15 @@ from srs_opt.calibrate.coordinates import Coordinate
 from srs_opt.calibrate.experiment import Point
 from srs_opt.calibrate.gram import TrialGram
 from srs_opt.calibrate.objective import (
+    AHEAD,
     CORRELATED,
+    Move,
+    bent_move,
+    best_move,
     excess_of,
     misfit_ratio,
     newton_step,
     objective,
-    priors,
     temper_of,
     within_reach,
 )
@@ -27,11 +30,16 @@ from srs_opt.measurement.records import Trial
 
 ITERATIONS = 12
 CONVERGED = 0.05  # of the deviance: a fifth of a standard deviation
-LONGEST_LOG_STEP = 0.7
-HOPELESS = 300.0  # deviance that even the linearisation promises to stay behind the one to beat
+# deviance, and share of it, that even the linearisation promises to stay behind the one to beat
+HOPELESS, HOPELESS_SHARE = 300.0, 0.1
 TRIED = 2  # iterations before that is believed
 TRUSTED = 0.25  # of the gain that slopes promise: with no larger error they serve for the next step too
+PLAIN = 25.0  # temper above which a misfit hides the errors of a simulation five times as rough
+PLAINLY = 0.01  # share of such a misfit that need not be gained
+CRAWL = 0.03  # share of the misfit; slopes of an earlier point that promise less are not worth a step
 FAR_OFF = 3.0  # temper from which on a fit does not explain the data
+LEAST_DAMPING = 0.001  # below: none
+FIRST_DAMPING = 0.02
 IDLE, MOST_DAMPING = 2, 1e4  # steps that gain nothing, and damping, at which a fit is given up
 TAKEN_BACK = (0.5, 0.2, 0.0)  # parts of a step that a trial's scatter may go instead
 FEW_ASTRAY = 3  # where no more than a third of the trials went astray: else the step was too long
@@ -53,8 +61,12 @@ class Measured(Protocol):
         trials: Sequence[Trial] | None = None,
         *,
         stale: bool = False,
+        rough: bool = False,
     ) -> dict[str, TrialGram]:
-        """Return the normal equations at `point`, by trial; `stale` allows slopes of an earlier point."""
+        """Return the normal equations at `point`, by trial.
+
+        `stale` allows slopes of an earlier point, `rough` motions that are good enough for a plain misfit.
+        """
 
 
 @dataclass(frozen=True)
@@ -114,6 +126,8 @@ def fit(
     beat: float = math.inf,
     correlated: float = CORRELATED,
     near: float = 0.0,
+    *,
+    rough: bool = False,
 ) -> Fit:
     """Return the most probable values of `coordinates` given the trials.
 
@@ -130,6 +144,8 @@ def fit(
     near : float
         Share of the misfit beyond the noise that a fit far off may leave to be gained and still count as
         converged: what does not explain the data need not be known well.
+    rough : bool
+        Whether the fit may end with slopes of an earlier point, its covariance with them.
 
     Raises
     ------
@@ -152,7 +168,7 @@ def fit(
             break
         if report is not None:
             report(f"misfit {sum(g.misfit for g in descent.grams.values()):.0f}")
-    return descent.end()
+    return descent.end(rough=rough)
 
 
 class _Descent:
@@ -169,7 +185,9 @@ class _Descent:
         self.experiment, self.coordinates, self.trials = experiment, coordinates, trials
         self.correlated, self.near = correlated, near
         self.done, self.idle, self.damping = 0, 0, 0.0
-        self.converged, self.behind = False, math.inf
+        self.converged, self.behind, self.rough = False, math.inf, True
+        self.bends = True  # until slopes turn out not to be kept
+        self.winding = False  # whether the last step found the valley bent
 
     def begin(self, point: Point) -> None:
         """Linearise where the fit starts."""
@@ -178,8 +196,17 @@ class _Descent:
         self.at_start = misfit_ratio(self.grams)
 
     def refresh(self) -> None:
-        """Take the slopes anew."""
-        self.grams = self.experiment.grams(self.point, self.coordinates, self.trials)
+        """Take the slopes anew, from a fine simulation once the misfit does not hide a rough one."""
+        self.grams = self._measured(self.point)
+        if self.rough and self.temper <= PLAIN:
+            self.rough = False
+            self.grams = self._measured(self.point)
+
+    def _measured(
+        self, point: Point, trials: Sequence[Trial] | None = None, *, stale: bool = False
+    ) -> dict[str, TrialGram]:
+        some = self.trials if trials is None else trials
+        return self.experiment.grams(point, self.coordinates, some, stale=stale, rough=self.rough)
 
     @property
     def stale(self) -> bool:
@@ -209,7 +236,10 @@ class _Descent:
         while True:
             enough, temper = CONVERGED, self.temper
             if temper > FAR_OFF:
-                enough = max(CONVERGED, self.near * excess_of(self.grams) / temper)
+                near = max(self.near, PLAINLY) if temper > PLAIN else self.near
+                enough = max(CONVERGED, near * excess_of(self.grams) / temper)
+            if self.stale:
+                enough = max(enough, CRAWL * excess_of(self.grams) / temper)
             if self.missing() >= enough:
                 return False
             if not self.stale:
@@ -228,35 +258,99 @@ class _Descent:
         """Go on where that gains, else take fresh slopes or damp the next step."""
         self.done += 1
         stale, temper, now, jitter = self.stale, self.temper, self.now(), self.jitter
-        moved, promised = _moved(self.point, self.coordinates, self.grams, temper, self.damping)
+        move = best_move(self.coordinates, self.grams, self.point, temper, self.damping)
         try:
-            grams = self.experiment.grams(moved, self.coordinates, self.trials, stale=True)
+            if self.winding and self.bends and not stale:
+                move = self._bent(move)
+            moved = _moved(self.point, self.coordinates, move)
+            grams = self._measured(moved, stale=True)
             before, after = (self.point, self.grams), (moved, grams)
-            moved = _tamed(self.experiment, self.coordinates, self.trials, before, after, temper)
+            moved = self._tamed(before, after, temper)
             gain = now - objective(self.coordinates, grams, moved, temper)
         except NoAnswerError:
             gain = -math.inf
         if gain > -jitter:
             self.idle = self.idle + 1 if gain < CONVERGED and self.damping < 1 and not stale else 0
             self.point, self.grams = moved, grams
-            self.damping = 0.0 if self.damping < 0.02 else self.damping * 0.3
-            if abs(gain - promised) > TRUSTED * promised:
+            self._ease(gain, move.promised)
+            off = abs(gain - move.promised) > TRUSTED * move.promised
+            self.winding = off
+            if off or (self.rough and self.temper <= PLAIN):
                 self.refresh()
         elif stale:
+            self.winding = True
             self.refresh()
         else:
-            self.damping = max(self.damping * 4, 0.1)
+            self.winding = True
+            self.damping = max(self.damping * 4, FIRST_DAMPING)
+
+    def _ease(self, gain: float, promised: float) -> None:
+        """Damp less where the slopes were right, more where they were not."""
+        if gain < TRUSTED * promised:
+            self.damping *= 2
+        elif gain > (1 - TRUSTED) * promised:
+            self.damping = 0.0 if self.damping < LEAST_DAMPING else self.damping * 0.3
+
+    def _bent(self, move: Move) -> Move:
+        """Return the step with the valley's bend followed."""
+        short = replace(move, step=AHEAD * move.step, scatter={n: AHEAD * b for n, b in move.scatter.items()})
+        there = _moved(self.point, self.coordinates, short)
+        ahead = self._measured(there, stale=True)
+        self.bends = any(g.stale for g in ahead.values())
+        own = self.coordinates, self.grams, ahead, self.point, self.temper, self.damping
+        return bent_move(*own, move) if self.bends else move
+
+    def _tamed(
+        self,
+        before: tuple[Point, Mapping[str, TrialGram]],
+        after: tuple[Point, dict[str, TrialGram]],
+        temper: float,
+    ) -> Point:
+        """Return the new point with the scatter of trials that went astray taken back; their matrices follow.
+
+        A trial's scatter is its own affair: one near a change of its gait, which follows far less linearly
+        than the others, must not hold up the fit to all.
+        """
+        (point, grams), (moved, new_grams) = before, after
+        step = np.array([moved.values[c.name] - point.values[c.name] for c in self.coordinates])
+
+        def own(gram: TrialGram) -> float:
+            return gram.misfit / temper + float(np.sum((gram.scatter_now / gram.scatter_sd) ** 2))
+
+        allowed = {}
+        for name in {t.name for t in self.trials} & grams.keys():
+            gram = grams[name]
+            now = point.scatter.get(name, np.zeros_like(gram.scatter_sd))
+            expected = gram.after(step, moved.scatter[name] - now, temper)
+            margin = 1 + JITTER * gram.count / temper + TRUSTED * abs(own(gram) - expected)
+            allowed[name] = expected + margin
+        scatter = dict(moved.scatter)
+        for part in TAKEN_BACK:
+            known = [t for t in self.trials if t.name in allowed]
+            astray = [t for t in known if own(new_grams[t.name]) > allowed[t.name]]
+            if not 0 < len(astray) <= len(allowed) // FEW_ASTRAY:
+                break
+            tried = dict(scatter)
+            for t in astray:
+                now = point.scatter.get(t.name, np.zeros_like(grams[t.name].scatter_sd))
+                tried[t.name] = now + part * (moved.scatter[t.name] - now)
+            found = self._measured(Point(moved.values, tried), astray, stale=True)
+            for t in astray:
+                if own(found[t.name]) < own(new_grams[t.name]):
+                    new_grams[t.name], scatter[t.name] = found[t.name], tried[t.name]
+        return Point(moved.values, scatter)
 
     def hopeless(self, beat: float) -> bool:
         """Whether the fit stays far behind the one to beat, and does not catch up."""
         excess = within_reach(self.coordinates, self.grams, self.point) - beat
-        late = self.done >= TRIED and excess > HOPELESS and excess > 0.5 * self.behind
+        far = max(HOPELESS, HOPELESS_SHARE * abs(beat)) if math.isfinite(beat) else math.inf
+        late = self.done >= TRIED and excess > far and excess > 0.5 * self.behind
         self.behind = excess
         return late
 
-    def end(self) -> Fit:
-        """Return the fit at the point, its slopes fresh."""
-        if self.stale:
+    def end(self, *, rough: bool) -> Fit:
+        """Return the fit at the point, its slopes fresh unless they need not be."""
+        if self.stale and not rough:
             self.refresh()
         return Fit(
             self.coordinates,
@@ -272,71 +366,10 @@ class _Descent:
         )
 
 
-def _moved(
-    point: Point,
-    coordinates: tuple[Coordinate, ...],
-    grams: Mapping[str, TrialGram],
-    temper: float,
-    damping: float,
-) -> tuple[Point, float]:
-    """Return the point after a step within reason, and the deviance that it promises to gain."""
-    step = newton_step(coordinates, grams, point, temper, damping).step
-    for k, c in enumerate(coordinates):
-        if not c.effect or "log_" in c.name:
-            step[k] = np.clip(step[k], -LONGEST_LOG_STEP, LONGEST_LOG_STEP)
-    parts = {name: g.eliminated(temper) for name, g in grams.items()}
-    scatter = dict(point.scatter)
-    for name, gram in grams.items():
-        back = parts[name].back
-        now = scatter.get(name, np.zeros(back.shape[0]))
-        limit = 5 * gram.scatter_sd
-        scatter[name] = np.clip(now + back[:, -1] - back[:, :-1] @ step, -limit, limit)
-    precision, offset = priors(coordinates, point)
-    both = np.append(step, -1.0)
-    gain = sum(e.at_point - float(both @ e.matrix @ both) for e in parts.values())
-    gain += float(precision @ (offset**2 - (offset + step) ** 2))
+def _moved(point: Point, coordinates: tuple[Coordinate, ...], move: Move) -> Point:
+    """Return the point after a step."""
     values = dict(point.values)
-    for coordinate, s in zip(coordinates, step):
+    for coordinate, s in zip(coordinates, move.step):
         values[coordinate.name] += float(s)
-    return Point(values, scatter), gain
-
-
-def _tamed(
-    experiment: Measured,
-    coordinates: tuple[Coordinate, ...],
-    trials: Sequence[Trial],
-    before: tuple[Point, Mapping[str, TrialGram]],
-    after: tuple[Point, dict[str, TrialGram]],
-    temper: float,
-) -> Point:
-    """Return the new point with the scatter of trials that went astray taken back; their matrices follow.
-
-    A trial's scatter is its own affair: one near a change of its gait, which follows far less linearly than
-    the others, must not hold up the fit to all.
-    """
-    (point, grams), (moved, new_grams) = before, after
-    step = [moved.values[c.name] - point.values[c.name] for c in coordinates]
-    both = np.append(step, -1.0)
-
-    def own(gram: TrialGram) -> float:
-        return gram.misfit / temper + float(np.sum((gram.scatter_now / gram.scatter_sd) ** 2))
-
-    allowed = {}
-    for name in {t.name for t in trials} & grams.keys():
-        gram = grams[name]
-        expected = float(both @ gram.eliminated(temper).matrix @ both)
-        allowed[name] = expected + 1 + JITTER * gram.count / temper + TRUSTED * abs(own(gram) - expected)
-    scatter = dict(moved.scatter)
-    for part in TAKEN_BACK:
-        astray = [t for t in trials if t.name in allowed and own(new_grams[t.name]) > allowed[t.name]]
-        if not 0 < len(astray) <= len(allowed) // FEW_ASTRAY:
-            break
-        tried = dict(scatter)
-        for t in astray:
-            now = point.scatter.get(t.name, np.zeros_like(grams[t.name].scatter_sd))
-            tried[t.name] = now + part * (moved.scatter[t.name] - now)
-        found = experiment.grams(Point(moved.values, tried), coordinates, astray, stale=True)
-        for t in astray:
-            if own(found[t.name]) < own(new_grams[t.name]):
-                new_grams[t.name], scatter[t.name] = found[t.name], tried[t.name]
-    return Point(moved.values, scatter)
+    at = {n: point.scatter.get(n, np.zeros_like(b)) + b for n, b in move.scatter.items()}
+    return Point(values, {**point.scatter, **at})

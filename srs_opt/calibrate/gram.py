@@ -8,7 +8,7 @@ about subsets of coordinates (scores, fits, cross-validation) is algebra on smal
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -40,26 +40,91 @@ class TrialGram:
     scatter_now: np.ndarray
     serial: float = 0.0
     stale: bool = False
+    _known: dict[float, Eliminated] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @property
     def misfit(self) -> float:
         """Sum of squared residuals over the noise variance."""
         return float(self.raw[-1, -1])
 
-    def eliminated(self, temper: float = 1.0) -> Eliminated:
-        """Integrate the scatter out, the noise variance being `temper` times as large."""
+    def eliminated(
+        self, temper: float = 1.0, held: np.ndarray | None = None, damping: float = 0.0
+    ) -> Eliminated:
+        """Integrate the scatter out, the noise variance being `temper` times as large.
+
+        Parameters
+        ----------
+        held : array (B,), optional
+            By how much the scatter moves where that is decided; NaN where it is free.
+        damping : float
+            Relative, on the scatter's own curvature: a damped step is short in the scatter too.
+        """
+        if held is not None or damping:
+            return self._eliminate(temper, held, damping)
+        if temper not in self._known:
+            self._known[temper] = self._eliminate(temper, None, 0.0)
+        return self._known[temper]
+
+    def _eliminate(self, temper: float, held: np.ndarray | None, damping: float) -> Eliminated:
         index = np.array(self.scattered, dtype=int)
         precision = self.scatter_sd**-2.0
         whole = self.raw / temper
         inner = whole[np.ix_(index, index)] + np.diag(precision)
         cross = whole[index].copy()
         cross[:, -1] -= self.scatter_now * precision
-        back = np.linalg.solve(inner, cross)
-        matrix = whole - cross.T @ back
-        matrix[-1, -1] += float(np.sum(self.scatter_now**2 * precision))
-        at_point = self.misfit / temper + float(np.sum(self.scatter_now**2 * precision))
         log_det = float(np.linalg.slogdet(inner)[1] - np.sum(np.log(precision)))
+        at_point = self.misfit / temper + float(np.sum(self.scatter_now**2 * precision))
+        matrix = whole.copy()
+        matrix[-1, -1] = at_point
+        free = np.ones(index.size, dtype=bool)
+        back = np.zeros_like(cross)
+        if held is not None:
+            free = np.isnan(held)
+            move = np.where(free, 0.0, held)
+            matrix[-1, -1] += move @ inner @ move - 2 * move @ cross[:, -1]
+            matrix[:-1, -1] -= move @ cross[:, :-1]
+            matrix[-1, :-1] = matrix[:-1, -1]
+            cross[:, -1] -= inner @ move
+            back[~free, -1] = move[~free]
+        damped = inner + damping * np.diag(np.diag(inner))
+        back[free] = np.linalg.solve(damped[np.ix_(free, free)], cross[free])
+        matrix -= cross[free].T @ back[free]
         return Eliminated(matrix, at_point, log_det, back)
+
+    def after(self, step: np.ndarray, moved: np.ndarray, temper: float = 1.0) -> float:
+        """Return the deviance that the linearisation promises after a step (K,), the scatter moved (B,)."""
+        both = np.append(step, -1.0)
+        both[list(self.scattered)] += moved
+        scatter = (self.scatter_now + moved) / self.scatter_sd
+        return float(both @ self.raw @ both) / temper + float(scatter @ scatter)
+
+    def length2(self, step: np.ndarray, moved: np.ndarray) -> float:
+        """Return the square of what a step and a move change in the prediction, over the noise's."""
+        both = step.copy()
+        both[list(self.scattered)] += moved
+        return float(both @ self.raw[:-1, :-1] @ both)
+
+    def pull(self, step: np.ndarray, moved: np.ndarray, temper: float = 1.0) -> np.ndarray:
+        """Return minus half the gradient of `after` by the scatter (B,): where it is drawn."""
+        both = np.append(step, -1.0)
+        both[list(self.scattered)] += moved
+        back = (self.scatter_now + moved) / self.scatter_sd**2
+        return np.asarray(-(self.raw[list(self.scattered)] @ both) / temper - back)
+
+    def bent(self, ahead: TrialGram, step: np.ndarray, moved: np.ndarray, share: float) -> TrialGram:
+        """Return equations whose solution undoes the bend of the prediction along a step and a move.
+
+        Parameters
+        ----------
+        ahead : TrialGram
+            With the slopes of this point, the residuals of where `share` of the step leads.
+        """
+        both = step.copy()
+        both[list(self.scattered)] += moved
+        straight = self.raw[:-1, -1] - share * (self.raw[:-1, :-1] @ both)
+        raw = self.raw.copy()
+        raw[:-1, -1] = raw[-1, :-1] = 2 / share**2 * (ahead.raw[:-1, -1] - straight)
+        return replace(self, raw=raw, scatter_now=np.zeros_like(self.scatter_now))
 
     def only(self, columns: Sequence[int]) -> TrialGram:
         """Return the Gram matrix over some of the columns (all of the scatter's among them)."""

@@ -81,8 +81,9 @@ class Maps:
         trials: Sequence[Trial] | None = None,
         *,
         stale: bool = False,
+        rough: bool = False,
     ) -> dict[str, TrialGram]:
-        """Return the normal equations of every row, the slopes always fresh.
+        """Return the normal equations of every row, the slopes always fresh and the orbits fine.
 
         Raises
         ------

@@ -209,16 +209,4 @@ def _nodes(states: np.ndarray, valve: np.ndarray, h_s: np.ndarray, p: np.ndarray
     )
 
 
-def with_memory(nodes: Nodes, width: float) -> np.ndarray:
-    """Return the hysteresis variable z along the nodes (closed form while a curvature moves one way)."""
-    if nodes.memory.shape[1]:
-        return nodes.memory
-    z = np.zeros_like(nodes.kappa)
-    change = np.diff(nodes.kappa, axis=0)
-    goal, stay = np.sign(change) * width, np.exp(-np.abs(change) / width)
-    for k in range(change.shape[0]):
-        z[k + 1] = goal[k] + (z[k] - goal[k]) * stay[k]
-    return z
-
-
-__all__ = ["Gait", "Nodes", "TrialRun", "conditions_of", "timeline_of", "with_memory"]
+__all__ = ["Gait", "Nodes", "TrialRun", "conditions_of", "timeline_of"]

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,6 +13,11 @@ from srs_opt.calibrate.experiment import Point
 from srs_opt.calibrate.gram import Solution, TrialGram, bounded_solve
 
 CORRELATED = 100.0  # values of a track that a smooth misfit makes count as one
+LONGEST_LOG_STEP = 0.7
+MOST_SCATTER = 5.0  # standard deviations that a trial's own friction and curvature may have
+AHEAD = 0.1  # share of a step at which its bend is looked at
+MOST_BEND = 0.75  # length of the acceleration over that of the step
+HELD = 12  # rounds of finding out whose scatter is at its limit
 
 
 def priors(coordinates: Sequence[Coordinate], point: Point) -> tuple[np.ndarray, np.ndarray]:
@@ -49,8 +55,8 @@ def within_reach(
     coordinates: tuple[Coordinate, ...], grams: Mapping[str, TrialGram], point: Point, temper: float = 1.0
 ) -> float:
     """Return the deviance at the minimum that the linearisation promises."""
-    log_det = sum(g.eliminated(temper).log_det for g in grams.values())
-    return newton_step(coordinates, grams, point, temper).deviance + log_det
+    promised = best_move(coordinates, grams, point, temper, longest=math.inf).promised
+    return objective(coordinates, grams, point, temper) - promised
 
 
 def excess_of(grams: Mapping[str, TrialGram]) -> float:
@@ -58,18 +64,122 @@ def excess_of(grams: Mapping[str, TrialGram]) -> float:
     return sum(max(g.misfit - g.count, 0.0) for g in grams.values())
 
 
-def newton_step(
+@dataclass(frozen=True)
+class Move:
+    """A step of a fit.
+
+    Attributes
+    ----------
+    step : array (K,)
+    scatter : dict
+        Trial name -> by how much its scatter moves.
+    promised : float
+        Deviance that the linearisation promises to gain.
+    """
+
+    step: np.ndarray
+    scatter: dict[str, np.ndarray]
+    promised: float
+
+
+def best_move(
     coordinates: tuple[Coordinate, ...],
     grams: Mapping[str, TrialGram],
     point: Point,
     temper: float,
     damping: float = 0.0,
+    longest: float = LONGEST_LOG_STEP,
+) -> Move:
+    """Return the step to the minimum that the slopes promise, the scatter within its limits.
+
+    A trial whose scatter would leave its limits has it held there, and the shared coordinates know: a model
+    that lacks something drives scatter that far, and a step that counts on more of it would only lose.
+    """
+    held: dict[str, np.ndarray] = {}
+    for _ in range(HELD):
+        parts = {n: g.eliminated(temper, held.get(n), damping) for n, g in grams.items()}
+        step = _solved(coordinates, [e.matrix for e in parts.values()], point, damping).step
+        for k, c in enumerate(coordinates):
+            if not c.effect or "log_" in c.name:
+                step[k] = np.clip(step[k], -longest, longest)
+        free = {n: e.back[:, -1] - e.back[:, :-1] @ step for n, e in parts.items()}
+        scatter = {n: _within(grams[n], b) for n, b in free.items()}
+        now = {n: _held(grams[n], b, free[n], step, temper) for n, b in scatter.items()}
+        if all(np.array_equal(np.isnan(b), np.isnan(held.get(n, np.nan * b))) for n, b in now.items()):
+            break
+        held = now
+    precision, offset = priors(coordinates, point)
+    promised = sum(parts[n].at_point - g.after(step, scatter[n], temper) for n, g in grams.items())
+    promised += float(precision @ (offset**2 - (offset + step) ** 2))
+    return Move(step, scatter, promised)
+
+
+def bent_move(
+    coordinates: tuple[Coordinate, ...],
+    grams: Mapping[str, TrialGram],
+    ahead: Mapping[str, TrialGram],
+    point: Point,
+    temper: float,
+    damping: float,
+    move: Move,
+) -> Move:
+    """Return the step along the valley's bend: half the geodesic acceleration on top.
+
+    After Transtrum and Sethna (2012), doi 10.48550/arXiv.1201.5885. `ahead` are the normal equations where
+    AHEAD of the step leads, with the slopes of the point.
+    """
+    bent = {n: g.bent(ahead[n], move.step, b, AHEAD) for n, (g, b) in _pairs(grams, move) if ahead[n].stale}
+    parts = {n: g.eliminated(temper, damping=damping) for n, g in bent.items()}
+    rest = [g.eliminated(temper).matrix.copy() for n, g in grams.items() if n not in bent]
+    for matrix in rest:
+        matrix[:-1, -1] = matrix[-1, :-1] = 0.0
+    free = tuple(replace(c, lower=-math.inf, start=point.values[c.name]) for c in coordinates)
+    turn = _solved(free, [*(e.matrix for e in parts.values()), *rest], point, damping).step
+    turns = {n: e.back[:, -1] - e.back[:, :-1] @ turn for n, e in parts.items()}
+    length, size = (
+        math.sqrt(sum(g.length2(s, b[n]) for n, g in grams.items() if n in bent))
+        for s, b in ((move.step, move.scatter), (turn, turns))
+    )
+    share = 0.5 * min(1.0, MOST_BEND * length / max(size, 1e-300))
+    lower = np.array([c.lower - point.values[c.name] for c in coordinates])
+    step = np.maximum(move.step + share * turn, lower)
+    scatter = {n: _within(grams[n], b + share * turns.get(n, 0.0)) for n, b in move.scatter.items()}
+    return Move(step, scatter, move.promised)
+
+
+def _pairs(grams: Mapping[str, TrialGram], move: Move) -> Iterable[tuple[str, tuple[TrialGram, np.ndarray]]]:
+    return ((n, (g, move.scatter[n])) for n, g in grams.items())
+
+
+def _within(gram: TrialGram, moved: np.ndarray) -> np.ndarray:
+    limit = MOST_SCATTER * gram.scatter_sd
+    return np.asarray(np.clip(gram.scatter_now + moved, -limit, limit) - gram.scatter_now)
+
+
+def _held(
+    gram: TrialGram, moved: np.ndarray, free: np.ndarray, step: np.ndarray, temper: float
+) -> np.ndarray:
+    """Return the moves of what leaves its limits, or is held there and drawn further out; else NaN."""
+    at = gram.scatter_now + moved
+    at_limit = np.abs(at) >= MOST_SCATTER * gram.scatter_sd * (1 - 1e-9)
+    outwards = (moved != free) | (gram.pull(step, moved, temper) * at > 0)
+    return np.where(at_limit & outwards, moved, np.nan)
+
+
+def newton_step(
+    coordinates: tuple[Coordinate, ...], grams: Mapping[str, TrialGram], point: Point, temper: float
 ) -> Solution:
     """Solve for the step, holding coordinates that would leave their bounds at the bound."""
+    return _solved(coordinates, [g.eliminated(temper).matrix for g in grams.values()], point)
+
+
+def _solved(
+    coordinates: tuple[Coordinate, ...], matrices: Sequence[np.ndarray], point: Point, damping: float = 0.0
+) -> Solution:
     precision, offset = priors(coordinates, point)
     now = np.array([point.values[c.name] for c in coordinates])
     lower = np.array([c.lower for c in coordinates])
-    total = sum_eliminated(grams, temper)
+    total = np.sum(matrices, axis=0)
     if damping:
         own = np.arange(len(coordinates))
         total[own, own] += damping * (total[own, own] + precision)

@@ -10,10 +10,10 @@ import casadi as ca
 import numpy as np
 
 from srs_opt.calibrate.coordinates import Coordinate
+from srs_opt.calibrate.mapped import evaluate, mapped
 from srs_opt.calibrate.model import CAMERA, Model, Values
 from srs_opt.calibrate.nominal import Nodes
-from srs_opt.calibrate.sensitivity import evaluate, mapped, variation
-from srs_opt.calibrate.tangents import exact_variation
+from srs_opt.calibrate.sensitivity import variation
 from srs_opt.measurement.records import Trial
 from srs_opt.model.effects import all_effects
 from srs_opt.model.parameters import Structure
@@ -130,15 +130,12 @@ def predict(
     if not coordinates:
         return Prediction(points, slopes, pose, kappa)
     seeds = model.seeds(values, _conditions(trial), coordinates)[kept]
-    width = float(np.exp(values.get("hysteresis.log_width", np.log(4.0))))
     moving = np.flatnonzero(np.any(seeds != 0, axis=0))
     jac_pose = by_pose.reshape(frames, 3, seen).transpose(0, 2, 1)
     jac_kappa = by_kappa.reshape(frames, -1, seen).transpose(0, 2, 1)
     if moving.size:
-        if structure == model.structures[0]:
-            varied = exact_variation(structure, nodes, nodes.p[kept], seeds[:, moving], trial.heading_rad)
-        else:
-            varied = variation(structure, nodes, nodes.p[kept], seeds[:, moving], trial.heading_rad, width)
+        typical = np.array([coordinates[int(k)].typical for k in moving])
+        varied = variation(structure, nodes, nodes.p[kept], seeds[:, moving], typical, trial.heading_rad)
         part = jac_pose @ _linear(nodes.time_s, varied.pose, at)
         part += jac_kappa @ _linear(nodes.time_s, varied.kappa, at)
         jac_p = by_p.reshape(frames, -1, seen).transpose(0, 2, 1)

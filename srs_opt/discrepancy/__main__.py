@@ -5,13 +5,16 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from srs_opt.command import Answer, Parser, make_parser, run_command, say
 from srs_opt.processes import one_thread_of_linear_algebra
 
 if TYPE_CHECKING:
+    from planners.maze.maze import Maze
+    from srs_opt.discrepancy.pictures import Picture
     from srs_opt.discrepancy.pipeline import Discrepancy
+    from srs_opt.robot import Robot
 
 
 def build_parser() -> Parser:
@@ -22,7 +25,8 @@ def build_parser() -> Parser:
         "shrink on trials that no fit saw. Writes report.html and corrected_robot.yaml.\n"
         "JSON: verdict (no_gap, named, one_of, unknown, not_testable), effects, alternatives, located,\n"
         "gap (m, root mean square per coordinate), next_experiment, candidates, corrected_robot, seconds;\n"
-        "with --payoff also payoff (m/s, rad/s; null where nothing was named).",
+        "with --payoff also payoff (m/s, rad/s; null where nothing was named), with --maze payoff.maze\n"
+        "(m, s): plans before and after, both driven on the corrected robot.",
         "python -m srs_opt.discrepancy data/my_set --json",
         robot=False,
         sweep=True,
@@ -40,6 +44,12 @@ def build_parser() -> Parser:
         help="also optimize the fastest gait of the calibrated and of the corrected robot, and show what the "
         "name changes (half a minute when first compiled, then some seconds)",
     )
+    parser.add_argument(
+        "--maze",
+        type=Path,
+        metavar="FILE",
+        help="a maze (see plan --help) to plan through before and after as well; implies --payoff",
+    )
     parser.add_argument("--model", choices=("complex", "simplified"), default="complex", help="dynamic model")
     return parser
 
@@ -47,7 +57,6 @@ def build_parser() -> Parser:
 def run(options: argparse.Namespace) -> Answer:
     """Find the discrepancy; write the report and the corrected robot."""
     from srs_opt.discrepancy.answer import answer, corrected_robot
-    from srs_opt.discrepancy.payoff import payoff
     from srs_opt.discrepancy.pipeline import find_discrepancy
     from srs_opt.discrepancy.report import write_report
     from srs_opt.measurement.dataset import load_dataset
@@ -55,6 +64,7 @@ def run(options: argparse.Namespace) -> Answer:
 
     dataset = load_dataset(options.dataset)
     effects = _effect_names(options.effects) if options.effects else None
+    maze = _maze(options, dataset.robot)
     found = find_discrepancy(
         dataset,
         effects,
@@ -70,12 +80,51 @@ def run(options: argparse.Namespace) -> Answer:
         files.append(save_robot(robot, options.out / "corrected_robot.yaml"))
     record = answer(found, files[0] if files else None)
     summary = _summary(found)
-    if options.payoff:
-        gains = payoff(found, options.model, lambda message: say(options, message))
-        record["payoff"] = None if gains is None else gains.to_record() | {"words": gains.in_words()}
-        summary += "" if gains is None else f"\n{gains.in_words()}"
-    files.append(write_report(found, record, options.out / "report.html"))
+    further: list[Picture] = []
+    if options.payoff or maze is not None:
+        record["payoff"], words, further = _payoff(options, found, maze)
+        summary += words
+    files.append(write_report(found, record, options.out / "report.html", further))
     return Answer(record, summary, good=found.verdict.word != "not_testable", files=tuple(files))
+
+
+def _maze(options: argparse.Namespace, robot: Robot) -> Maze | None:
+    """Return the maze of --maze, looked at before anything slow."""
+    if options.maze is None:
+        return None
+    from planners.plan.payoff import maze_of
+
+    return maze_of(options.maze, robot)
+
+
+def _payoff(
+    options: argparse.Namespace, found: Discrepancy, maze: Maze | None
+) -> tuple[dict[str, Any] | None, str, list[Picture]]:
+    """Return what the name changes: for the record, in words, and as pictures."""
+    from srs_opt.discrepancy.payoff import payoff
+    from srs_opt.discrepancy.pictures import encoded
+
+    def tell(message: str) -> None:
+        say(options, message)
+
+    gains = payoff(found, options.model, tell)
+    if gains is None:
+        return None, "", []
+    record = gains.to_record() | {"words": gains.in_words()}
+    if maze is None:
+        return record, f"\n{gains.in_words()}", []
+    from planners.plan.payoff import maze_payoff
+    from planners.view.payoff_picture import payoff_figure
+
+    sides = (gains.calibrated, gains.promised.gait), (gains.corrected, gains.after.gait)
+    rides = maze_payoff(*sides, maze, options.model, tell)
+    record["maze"] = rides.to_record() | {"words": rides.in_words()}
+    caption = (
+        "Both plans are driven by the corrected robot, which stands for the real one: by the plan's valves "
+        "alone (with the region that the body sweeps), and corrected every cycle"
+    )
+    picture = encoded(payoff_figure(rides), "Plans before and after, and what comes of them", f"{caption}.")
+    return record, f"\n{gains.in_words()}\n{rides.in_words()}", [picture]
 
 
 def _effect_names(path: Path) -> list[str]:

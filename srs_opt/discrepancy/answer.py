@@ -10,10 +10,10 @@ import numpy as np
 
 from srs_opt.calibrate.coordinates import Candidate, effect_spec
 from srs_opt.calibrate.result import calibrated_robot
+from srs_opt.discrepancy.examined import needed_gain
 from srs_opt.discrepancy.hypothesis import Hypothesis
 from srs_opt.discrepancy.pipeline import Discrepancy
 from srs_opt.discrepancy.screen import Score
-from srs_opt.discrepancy.search import needed_gain
 from srs_opt.discrepancy.verdict import NAMED, ONE_OF
 from srs_opt.robot import Robot
 

@@ -82,9 +82,9 @@ def next_experiment(
         return None
     first, second = rivals[0], rivals[1]
     options = {i.what: _instrument_gain(i, first, second) for i in INSTRUMENTS}
-    for what, trial in proposals(experiment, trials).items():
-        gain = min(_trial_gain(experiment, a, b, trial) for a, b in ((first, second), (second, first)))
-        options[what] = gain
+    new = proposals(experiment, trials)
+    both = [_trial_gains(experiment, a, b, new) for a, b in ((first, second), (second, first))]
+    options |= {what: min(gains[what] for gains in both) for what in new}
     what, gain = max(options.items(), key=lambda item: item[1])
     names = tuple(" + ".join(h.names) for h in rivals)
     return NextExperiment(what, names, round(power(gain), 3))
@@ -92,9 +92,9 @@ def next_experiment(
 
 def power(gain: float) -> float:
     """Return the probability that a separation of expected deviance `gain` exceeds the level that decides."""
-    from scipy import stats
+    from scipy.special import chndtr
 
-    return float(stats.ncx2.sf(LEVEL, 1, max(gain, 1e-9)))
+    return float(1 - chndtr(LEVEL, 1, max(gain, 1e-9)))
 
 
 def _instrument_gain(instrument: Instrument, a: Hypothesis, b: Hypothesis) -> float:
@@ -110,7 +110,6 @@ def proposals(experiment: Experiment, trials: Sequence[Trial]) -> Mapping[str, T
     blank = np.zeros((time_s.size, experiment.model.links, 2))
     plain = replace(
         model,
-        name="(next)",
         time_s=time_s,
         markers_m=blank,
         centre_m=None,
@@ -130,21 +129,26 @@ def proposals(experiment: Experiment, trials: Sequence[Trial]) -> Mapping[str, T
         one = replace(steps, intervals=((segment, 0.0, 1.0),))
         step = replace(plain, schedule=one, frequency_hz=0.5, kind="step")
         found[f"a step of segment {segment} alone"] = step
-    return found
+    return {what: replace(trial, name=what) for what, trial in found.items()}
 
 
-def _trial_gain(experiment: Experiment, truth: Hypothesis, other: Hypothesis, trial: Trial) -> float:
-    """Return the deviance by which `other` would miss a trial that `truth` predicts, refitted to all data."""
-    probe = Experiment(experiment.model, (trial,), experiment.sd_m)
-    try:
-        expected = probe.predict(trial, Point(truth.fit.point.values))
-        probe.tracks[trial.name] = expected.points
-        gram = probe.gram(trial, Point(other.fit.point.values), other.fit.coordinates)
-    except NoAnswerError:
-        return 0.0
+def _trial_gains(
+    experiment: Experiment, truth: Hypothesis, other: Hypothesis, new: Mapping[str, Trial]
+) -> dict[str, float]:
+    """Return the deviance by which `other`, refitted to all data, would miss what `truth` predicts."""
+    probe = Experiment(experiment.model, tuple(new.values()), experiment.sd_m)
     known = np.linalg.pinv(other.fit.covariance, hermitian=True)
-    total = gram.eliminated().matrix.copy()
-    total[:-1, :-1] += known
     free = [k for k in range(len(other.fit.coordinates)) if other.fit.covariance[k, k] > 0]
     none = np.zeros(len(other.fit.coordinates))
-    return bounded_solve(total, free, none, none, none - np.inf).deviance
+    try:
+        expected = probe.predictions(probe.trials, Point(truth.fit.point.values))
+        probe.tracks = {t.name: e.points for t, e in zip(probe.trials, expected)}
+        grams = probe.grams(Point(other.fit.point.values), other.fit.coordinates)
+    except NoAnswerError:
+        return dict.fromkeys(new, 0.0)
+    found = {}
+    for what, trial in new.items():
+        total = grams[trial.name].eliminated().matrix.copy()
+        total[:-1, :-1] += known
+        found[what] = bounded_solve(total, free, none, none, none - np.inf).deviance
+    return found

@@ -100,7 +100,7 @@ def detect(
     serial : array
         Standardised autocorrelation of every trial.
     """
-    from scipy import stats
+    from scipy.special import chdtrc, ndtr
 
     size = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     z, correlation = score / size, covariance / size[:, None] / size
@@ -112,13 +112,13 @@ def detect(
         whiten = _whiten(correlation[np.ix_(list(group), list(group))])
         dof = whiten.shape[1]
         value = float(np.sum((z[list(group)] @ whiten) ** 2))
-        p = float(stats.chi2.sf(value, dof)) if dof else 1.0
+        p = float(chdtrc(dof, value)) if dof else 1.0
         found.append(GroupScore(value, dof, p))
         observed.append(p)
-        simulated.append(stats.chi2.sf(np.sum((drawn[:, list(group)] @ whiten) ** 2, axis=1), dof or 1))
+        simulated.append(chdtrc(dof or 1, np.sum((drawn[:, list(group)] @ whiten) ** 2, axis=1)))
     smallest = np.min(simulated, axis=0) if simulated else np.ones(1)
     adjusted = tuple(float((1 + np.sum(smallest <= p)) / (1 + smallest.size)) for p in observed)
-    serial_p = float(stats.norm.sf(serial.sum() / np.sqrt(max(serial.size, 1)))) if serial.size else 1.0
+    serial_p = float(ndtr(-serial.sum() / np.sqrt(max(serial.size, 1)))) if serial.size else 1.0
     # the family of groups and the autocorrelation share the level unequally: the latter sees little more
     whole = min(1.0, min([1.0, *(a / 0.9 for a in adjusted)]), serial_p / 0.1)
     return Detection(whole, tuple(found), serial_p, adjusted)

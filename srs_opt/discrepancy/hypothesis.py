@@ -94,8 +94,10 @@ def fit_hypothesis(
     iterations: int = ITERATIONS,
     beat: float = math.inf,
     near: float = 0.0,
+    *,
+    rough: bool = False,
 ) -> Hypothesis:
-    """Fit the base coordinates together with the effects of `candidates`; `near` as for `fit`."""
+    """Fit the base coordinates together with the effects of `candidates`; `near` and `rough` as for `fit`."""
     coordinates = (*base, *(c for k in candidates for c in k.coordinates))
-    found = fit(experiment, coordinates, start, trials, iterations, beat=beat, near=near)
+    found = fit(experiment, coordinates, start, trials, iterations, beat=beat, near=near, rough=rough)
     return Hypothesis(tuple(candidates), found)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from srs_opt.calibrate.objective import sum_eliminated
-from srs_opt.discrepancy.search import Examined
+from srs_opt.discrepancy.examined import Examined
 
 ODD = 3.0
 STAGES = {

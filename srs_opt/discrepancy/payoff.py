@@ -36,12 +36,15 @@ class Payoff:
         Optimized for the corrected robot, and simulated on it.
     left_out : tuple of str
         Effects that know the room: no steady gait shows them.
+    calibrated, corrected : Robot
     """
 
     promised: Orbit
     before: Orbit
     after: Orbit
     left_out: tuple[str, ...]
+    calibrated: Robot
+    corrected: Robot
 
     def to_record(self) -> dict[str, Any]:
         """Return the `payoff` entry of the command's JSON."""
@@ -97,6 +100,8 @@ def payoff(
             steady_gait(after, gaits[0], model),
             steady_gait(after, gaits[1], model),
             tuple(room_effects(after)),
+            before,
+            after,
         )
     except NoAnswerError as error:
         tell(f"what the name changes is not shown: {error}")

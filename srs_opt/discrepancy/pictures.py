@@ -47,7 +47,8 @@ def _figure(width: float, height: float) -> Figure:
     return figure
 
 
-def _encoded(figure: Figure, title: str, caption: str) -> Picture:
+def encoded(figure: Figure, title: str, caption: str) -> Picture:
+    """Return a figure as a picture of the report."""
     stream = io.BytesIO()
     figure.savefig(stream, format="png", metadata={"Software": None})
     return Picture(title, caption, base64.b64encode(stream.getvalue()).decode("ascii"))
@@ -72,7 +73,7 @@ def _sealed(found: Discrepancy) -> Picture:
         axis.set_ylim(bottom=0)
     axes[0].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3)
     axes[-1].set_xlabel("time (s)")
-    return _encoded(
+    return encoded(
         figure,
         "The gap on sealed trials",
         "Distance between model and markers (root mean square per coordinate over a fifth of a second), each "
@@ -104,7 +105,7 @@ def _candidates(found: Discrepancy) -> Picture:
     axis.axvline(20, color="k", ls="--", lw=0.8)
     axis.set_xscale("log")
     axis.set_xlabel("expected gain (drop of the deviance); dashed: about what chance gives the best of all")
-    return _encoded(
+    return encoded(
         figure,
         "What each effect would explain",
         "From one linearisation about the calibrated model, without refitting; blue: in the best set.",
@@ -129,4 +130,4 @@ def _trials(found: Discrepancy) -> Picture:
     axis.yaxis.set_major_formatter(LogFormatter())
     axis.yaxis.set_minor_formatter(LogFormatter())
     axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
-    return _encoded(figure, "Every open trial", "1 is what noise alone leaves.")
+    return encoded(figure, "Every open trial", "1 is what noise alone leaves.")

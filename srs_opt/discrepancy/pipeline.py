@@ -13,11 +13,12 @@ from srs_opt.calibrate.fit import FAR_OFF
 from srs_opt.calibrate.model import Model
 from srs_opt.calibrate.noise import noise_sd_m
 from srs_opt.discrepancy.design import NextExperiment, next_experiment, rivals_of
+from srs_opt.discrepancy.examined import Examined
 from srs_opt.discrepancy.hypothesis import Hypothesis
 from srs_opt.discrepancy.locate import Place, locate, odd_trials
 from srs_opt.discrepancy.screen import Score
 from srs_opt.discrepancy.seal import Gap, open_seal
-from srs_opt.discrepancy.search import Examined, Search
+from srs_opt.discrepancy.search import Search
 from srs_opt.discrepancy.select import Selection, select
 from srs_opt.discrepancy.split import LEAST_OPEN, Split, few_and_brief, split_trials
 from srs_opt.discrepancy.verdict import DETECTED, NO_GAP, NOT_TESTABLE, ONE_OF, UNKNOWN, Verdict, judge
@@ -100,7 +101,7 @@ def find_discrepancy(
     experiment = Experiment(Model(dataset.robot, model), trials, sd, dataset.bench)
     candidates = _candidates(dataset, effects)
     search = Search(experiment, base_coordinates(dataset.robot), candidates, split.open, seed, tell, quick)
-    with helped(experiment, jobs, cluster):
+    with helped(experiment, jobs, cluster, (split.open, quick, split.sealed)):
         return _examine(dataset, search, split, tell, started)
 
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from srs_opt.discrepancy.pictures import pictures
+from srs_opt.discrepancy.examined import Examined
+from srs_opt.discrepancy.pictures import Picture, pictures
 from srs_opt.discrepancy.pipeline import Discrepancy
-from srs_opt.discrepancy.search import Examined
 from srs_opt.discrepancy.verdict import NAMED, NO_GAP, NOT_TESTABLE, ONE_OF, UNKNOWN
 from srs_opt.files import write_text
 
@@ -21,7 +22,9 @@ HEADLINES = {
 }
 
 
-def write_report(found: Discrepancy, record: dict[str, Any], path: Path) -> Path:
+def write_report(
+    found: Discrepancy, record: dict[str, Any], path: Path, further: Sequence[Picture] = ()
+) -> Path:
     """Write the report.
 
     Parameters
@@ -30,6 +33,8 @@ def write_report(found: Discrepancy, record: dict[str, Any], path: Path) -> Path
     record : dict
         The JSON answer, so that the report says nothing else.
     path : Path
+    further : sequence of Picture
+        Shown after those of the evidence.
     """
     from importlib import resources
 
@@ -49,7 +54,7 @@ def write_report(found: Discrepancy, record: dict[str, Any], path: Path) -> Path
         calibrated=_parameters(found),
         tests=_tests(found),
         caveats=caveats(found),
-        pictures=pictures(found),
+        pictures=[*pictures(found), *further],
         noise_mm=1e3 * found.sd_m,
     )
     return write_text(path, page)

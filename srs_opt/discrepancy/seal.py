@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from srs_opt.calibrate.coordinates import SCATTER_SD
 from srs_opt.calibrate.experiment import Experiment, Point
 from srs_opt.calibrate.fit import Fit
 from srs_opt.calibrate.objective import CORRELATED
@@ -54,20 +55,22 @@ class Gap:
 
 def sealed_residuals(experiment: Experiment, fit: Fit, trials: Sequence[Trial]) -> list[np.ndarray]:
     """Return the residuals (T, 2 M) of every trial at the fit, with the trial's own most probable scatter."""
-    found = []
-    for trial in trials:
-        point = Point(fit.point.values, {})
-        for _ in range(3):
-            gram = experiment.gram(trial, point, fit.coordinates)
+    own = [c for c in fit.coordinates if c.name in SCATTER_SD]
+    point = Point(fit.point.values, {})
+    for _ in range(3):
+        grams = experiment.grams(point, own, trials)
+        moved, settled = {}, True
+        for trial in trials:
+            gram = grams[trial.name]
             excess = gram.misfit / gram.count - 1 - 4 * np.sqrt(2 / gram.count)
             back = gram.eliminated(1 + CORRELATED * max(0.0, excess)).back
             now = point.scatter.get(trial.name, np.zeros(back.shape[0]))
-            moved = np.clip(now + back[:, -1], -4 * gram.scatter_sd, 4 * gram.scatter_sd)
-            if np.abs(moved - now).max() < 0.05 * gram.scatter_sd.min():
-                break
-            point = Point(fit.point.values, {trial.name: moved})
-        found.append(experiment.residual(trial, experiment.predict(trial, point)))
-    return found
+            moved[trial.name] = np.clip(now + back[:, -1], -4 * gram.scatter_sd, 4 * gram.scatter_sd)
+            settled &= bool(np.abs(moved[trial.name] - now).max() < 0.05 * gram.scatter_sd.min())
+        if settled:
+            break
+        point = Point(fit.point.values, moved)
+    return [experiment.residual(t, p) for t, p in zip(trials, experiment.predictions(trials, point))]
 
 
 def open_seal(

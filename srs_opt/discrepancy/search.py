@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from srs_opt.calibrate.coordinates import Candidate, Coordinate
 from srs_opt.calibrate.experiment import Experiment, Point
-from srs_opt.calibrate.fit import FAR_OFF, Fit, start_point
+from srs_opt.calibrate.fit import FAR_OFF, PLAIN, Fit, start_point
 from srs_opt.calibrate.objective import priors, sum_eliminated
-from srs_opt.discrepancy.detect import Detection, detect, project
-from srs_opt.discrepancy.functions import Group, ResidualFunctions
+from srs_opt.discrepancy.detect import detect, project
+from srs_opt.discrepancy.examined import TELLING, Examined, explained, needed_gain
+from srs_opt.discrepancy.functions import ResidualFunctions
 from srs_opt.discrepancy.hypothesis import ITERATIONS, SMALL, Hypothesis, fit_hypothesis
 from srs_opt.discrepancy.screen import Linearisation, Score, expected_start, screen
 from srs_opt.discrepancy.split import brief_name
@@ -22,13 +22,6 @@ from srs_opt.measurement.records import Trial
 
 NULL_ITERATIONS, POLISH = 12, 40
 DEEPEST, ROUNDS = 4, 6  # effects at once; additions or exchanges in all
-ADEQUATE = 0.01  # level at which a fitted model is rejected
-# Friction's smoothing is numerical, and its shape is nobody's physics: long data see the difference. What is
-# left of a gap is put down to it while it is this share of the noise's variance and of the gap's, and asks
-# for nothing known at a size that matters: gaits near a change of theirs show a thousandth of a wheel's toe.
-OF_NOISE, OF_GAP = 0.02, 0.005
-TELLING = 0.1  # of an effect's typical size
-FALSE_NAME = 0.002  # family-wise level for adding an effect
 # Deviance within which two sets of effects cannot be told apart. The truth falls behind a rival by D with
 # probability Phi(-sqrt(D)) at worst, whatever separates the two: under 1 % here, so that the sets that are
 # kept hold the truth at 95 % with several rivals.
@@ -39,7 +32,10 @@ _MOST_REFITS = (5, 4, 3, 3)
 QUICK_ITERATIONS = 10  # with the first seconds of a few trials, before all are asked
 # shares of the misfit that fits which do not explain the data may leave to be gained: those, and all others
 ROUGHLY, NEARLY = 0.01, 0.001
-LEFT = 0.6  # share of the misfit that a second or later effect may leave and still count as progress
+# share of the misfit that a second or later effect may leave and still count as progress: what is added is
+# the largest of what is missing, so that of three effects the third leaves no more
+LEFT = 0.5
+HOPELESS = 0.1  # share of the gap that the best known effects leave, from which on more data help nothing
 FIRM = 10.0  # standard deviations from zero at which an effect is not superfluous, without a refit
 
 # effects that act much alike: a member that is well behind in the screen is refitted all the same
@@ -54,34 +50,6 @@ LOOK_ALIKES = (
     {"viscous_rolling", "stribeck", "slip_rate"},
 )
 Report = Callable[[str], None]
-
-
-@dataclass(frozen=True)
-class Examined:
-    """A hypothesis with its tests.
-
-    Attributes
-    ----------
-    hypothesis : Hypothesis
-    linearisation : Linearisation
-        Over all candidates and the residual functions.
-    detection : Detection
-        Of what is left.
-    groups : tuple of Group
-    scores : tuple of Score
-        What adding each candidate would gain.
-    """
-
-    hypothesis: Hypothesis
-    linearisation: Linearisation
-    detection: Detection
-    groups: tuple[Group, ...]
-    scores: tuple[Score, ...]
-
-    @property
-    def adequate(self) -> bool:
-        """Whether nothing is left beyond noise and scatter."""
-        return self.detection.p_value > ADEQUATE
 
 
 class Search:
@@ -155,7 +123,7 @@ class Search:
         self._report(f"refit on {on}: {label}" if label else "calibration alone")
         try:
             found = fit_hypothesis(
-                self.experiment, self.base, candidates, start, trials, iterations, beat, near
+                self.experiment, self.base, candidates, start, trials, iterations, beat, near, rough=quick
             )
         except NoAnswerError:
             return None
@@ -205,7 +173,8 @@ class Search:
         others = [c for k in self.candidates for c in k.sizes if c.name not in names]
         coordinates = (*fit.coordinates, *others)
         point = Point({**{c.name: 0.0 for c in others}, **fit.point.values}, fit.point.scatter)
-        grams = self.experiment.grams(point, coordinates, self.trials, self.functions)
+        rough = fit.temper > PLAIN
+        grams = self.experiment.grams(point, coordinates, self.trials, self.functions, rough=rough)
         return Linearisation(coordinates, len(fit.coordinates), point, grams, fit.temper)
 
     def significant(self, score: Score) -> bool:
@@ -214,8 +183,8 @@ class Search:
 
     def run(self, null: Examined) -> tuple[Examined, list[Hypothesis]]:
         """Return the best set of effects, examined, and everything that was refitted."""
-        current = null
-        for _ in range(ROUNDS):
+        current, ended = self._begun(null)
+        for _ in range(0 if ended else ROUNDS):
             depth = len(current.hypothesis.candidates)
             if depth >= DEEPEST:
                 break
@@ -228,6 +197,35 @@ class Search:
             if again or self._settled(null, current) or _stuck(before.hypothesis, current.hypothesis):
                 break
         return current, self.fitted
+
+    def _begun(self, null: Examined) -> tuple[Examined, bool]:
+        """Return what a search of the start of a few trials finds, fitted to all; whether that is the end.
+
+        It takes a third of the time, and most of a gap that it is left with is not mended by more data.
+        """
+        if self.quick == self.trials:
+            return null, False
+        brief = Search(self.experiment, self.base, self.candidates, self.quick, self.seed, self._report)
+        brief._fits = {(names, False): h for (names, quick), h in self._fits.items() if quick}
+        first = brief.calibrate(null.hypothesis.fit.point)
+        if first is None:
+            return null, False
+        start = brief.examine(first)
+        best, fitted = brief.run(start)
+        self._fits |= {(names, True): h for (names, _), h in brief._fits.items()}
+        limit = _cost(best.hypothesis) + 2 * RIVAL
+        near = [h for h in fitted if h.candidates and _cost(h) < limit]
+        better = self._best_of_whole(near) if best.hypothesis.candidates else None
+        if better is None or not self._worth(better, null.hypothesis):
+            return null, False
+        current = self._pruned(self.examine(self._polished(better)))
+        hopeless = _left(start.hypothesis, best.hypothesis) > HOPELESS
+        return current, hopeless or self._settled(null, current)
+
+    def _best_of_whole(self, tried: Sequence[Hypothesis]) -> Hypothesis | None:
+        """Return the best of some hypotheses when they are fitted to all trials."""
+        whole = [self.fit(h.candidates, h.fit.point) for h in tried]
+        return min((h for h in whole if h is not None), key=_cost, default=None)
 
     def _polished(self, hypothesis: Hypothesis) -> Hypothesis:
         """Return a hypothesis that explains the data with its fit carried on, where that had not ended."""
@@ -268,7 +266,8 @@ class Search:
 
     def _tried_out(self, hypothesis: Hypothesis) -> float:
         """Return what the start of a few trials says against a hypothesis that was fitted to all."""
-        tried = self.try_out(hypothesis.candidates, hypothesis.fit.point)
+        key = frozenset(c.label for c in hypothesis.candidates), True
+        tried = self._fits.get(key) or self.try_out(hypothesis.candidates, hypothesis.fit.point)
         return math.inf if tried is None else _cost(tried)
 
     def _proposals(self, current: Examined, depth: int) -> list[Score]:
@@ -309,8 +308,7 @@ class Search:
             return None
         found.sort(key=_cost)
         near = [h for h in found if _cost(h) < _cost(found[0]) + 2 * RIVAL]
-        whole = [self.fit(h.candidates, h.fit.point) for h in near]
-        return min((h for h in whole if h is not None), key=_cost, default=None)
+        return self._best_of_whole(near)
 
     def _worth(self, better: Hypothesis, current: Hypothesis) -> bool:
         gain = current.deviance - better.deviance
@@ -338,33 +336,16 @@ class Search:
         return current
 
 
-def explained(null: Examined, examined: Examined) -> bool:
-    """Whether nothing is left of the gap, or no more than the smoothing of friction can leave."""
-    if examined.adequate:
-        return True
-    family = len(examined.scores)
-    if any(
-        s.relative_size >= TELLING and s.improvement > needed_gain(s.candidate, family)
-        for s in examined.scores
-    ):
-        return False
-    left = examined.hypothesis.fit.misfit_ratio - 1
-    gap = null.hypothesis.fit.misfit_ratio - 1
-    return left < OF_NOISE and left < OF_GAP * gap
-
-
 def _stuck(before: Hypothesis, after: Hypothesis) -> bool:
     """Whether piling up effects only nibbles at the misfit: what is missing is none of them."""
-    left = (after.fit.misfit_ratio - 1) / max(before.fit.misfit_ratio - 1, 1e-9)
+    left = _left(before, after)
     return len(after.candidates) > 1 and after.fit.misfit_ratio > 1.2 and left > LEFT
+
+
+def _left(before: Hypothesis, after: Hypothesis) -> float:
+    """Return the share of a misfit beyond the noise that is left."""
+    return (after.fit.misfit_ratio - 1) / max(before.fit.misfit_ratio - 1, 1e-9)
 
 
 def _cost(hypothesis: Hypothesis) -> float:
     return hypothesis.deviance + 2 * hypothesis.parameters
-
-
-def needed_gain(candidate: Candidate, family: int) -> float:
-    """Return the drop of the deviance that the best of `family` candidates reaches by chance once in 500."""
-    from scipy import stats
-
-    return float(stats.chi2.isf(FALSE_NAME / max(family, 1), len(candidate.coordinates)))

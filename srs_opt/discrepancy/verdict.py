@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from srs_opt.discrepancy.examined import ADEQUATE, Examined, explained
 from srs_opt.discrepancy.seal import Gap
-from srs_opt.discrepancy.search import ADEQUATE, Examined, explained
 from srs_opt.discrepancy.select import Selection
 
 DETECTED = 0.05

@@ -1,13 +1,16 @@
 """The fit's own promises, on a model of two coordinates whose valley is curved."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy import optimize
 
 from srs_opt.calibrate.coordinates import Coordinate
 from srs_opt.calibrate.experiment import Point
 from srs_opt.calibrate.fit import CONVERGED, fit
 from srs_opt.calibrate.gram import trial_gram
-from srs_opt.calibrate.objective import objective, within_reach
+from srs_opt.calibrate.objective import AHEAD, MOST_SCATTER, bent_move, best_move, objective, within_reach
 
 TRUTH = np.array([0.4, 1.2])
 COORDINATES = (Coordinate("size.of_it", "size"), Coordinate("width.of_it", "width"))
@@ -28,14 +31,15 @@ class Curved:
     def values(self, x):
         return x[0] * np.exp(x[1] * (1 + 0.2 * self.t))
 
-    def grams(self, point, coordinates, trials=None, *, stale=False):
+    def grams(self, point, coordinates, trials=None, *, stale=False, rough=False):
         x = np.array([point.values[c.name] for c in coordinates])
         if not stale:
             steps = 1e-6 * np.eye(2)
             ends = [(self.values(x + s) - self.values(x - s)) / 2e-6 for s in steps]
             self.slopes = np.column_stack(ends)
         none = np.zeros(0)
-        return {"all": trial_gram(self.measured - self.values(x), self.slopes, 0.01, (), none, none)}
+        gram = trial_gram(self.measured - self.values(x), self.slopes, 0.01, (), none, none)
+        return {"all": replace(gram, stale=stale)}
 
 
 @pytest.mark.parametrize("count", [100, 100_000])
@@ -51,6 +55,52 @@ def test_a_converged_fit_has_nothing_left_to_gain_however_many_data(count, wrong
     if not wrong:
         off = [found.point.values[c.name] - v for c, v in zip(COORDINATES, TRUTH)]
         assert np.all(np.abs(off) < 4 * np.array(list(found.sd.values())))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_step_with_scatter_at_its_limits_is_that_of_a_general_solver(seed):
+    rng = np.random.default_rng(seed)
+    coordinates = (Coordinate("a", "a"), Coordinate("b", "b"))
+    trials, names = {}, ("one", "two", "three")
+    rows, measured, sd = [], [], np.array([0.03])
+    for k, name in enumerate(names):
+        slopes = rng.standard_normal((40, 2))
+        residual = slopes @ [0.5, -0.4] + (0.8, -0.9, 0.02)[k] * slopes[:, 0]  # more scatter than is allowed
+        residual += 0.1 * rng.standard_normal(40)
+        now = np.array([0.05 * (k - 1)])
+        trials[name] = trial_gram(residual, slopes, 0.1, (0,), sd, now)
+        own = np.zeros((40, 3))
+        own[:, k] = slopes[:, 0]
+        rows.append(np.column_stack([slopes, own]) / 0.1)
+        measured.append(residual / 0.1)
+    for k in range(3):  # the scatter's prior
+        rows.append(np.eye(5)[2 + k : 3 + k] / sd)
+        measured.append(-trials[names[k]].scatter_now / sd)
+    limit = [MOST_SCATTER * sd[0] - trials[n].scatter_now[0] for n in names]
+    low = [-MOST_SCATTER * sd[0] - trials[n].scatter_now[0] for n in names]
+    bounds = ([-np.inf, -np.inf, *low], [np.inf, np.inf, *limit])
+    theirs = optimize.lsq_linear(np.vstack(rows), np.concatenate(measured), bounds, tol=1e-14).x
+    move = best_move(coordinates, trials, Point({"a": 0.0, "b": 0.0}), 1.0)
+    assert move.step == pytest.approx(theirs[:2], abs=1e-5)
+    assert [move.scatter[n][0] for n in names] == pytest.approx(list(theirs[2:]), abs=1e-5)
+    assert move.promised > 0
+
+
+@pytest.mark.parametrize(("away", "share"), [(0.12, 0.6), (0.06, 0.25), (0.03, 0.15)])
+def test_the_bend_of_a_valley_is_followed_to_second_order(away, share):
+    measured = Curved(1000)
+    start = Point({"size.of_it": 0.4 * np.exp(1.1 * away), "width.of_it": 1.2 - away})
+    grams = measured.grams(start, COORDINATES)
+    move = best_move(COORDINATES, grams, start, 1.0, longest=np.inf)
+
+    def there(step):
+        values = {n: v + s for (n, v), s in zip(start.values.items(), step)}
+        return Point(values), measured.grams(Point(values), COORDINATES, stale=True)
+
+    bent = bent_move(COORDINATES, grams, there(AHEAD * move.step)[1], start, 1.0, 0.0, move)
+    lowest = fit(measured, COORDINATES, start, iterations=100).deviance
+    left = [objective(COORDINATES, *there(m.step)[::-1], 1.0) - lowest for m in (move, bent)]
+    assert left[1] < share * left[0]
 
 
 def test_a_fit_that_was_cut_short_says_so():

@@ -57,3 +57,37 @@ def test_bounds_are_those_of_a_general_solver(seed):
     theirs = optimize.lsq_linear(slopes, residual, (lower, np.full(5, np.inf)), tol=1e-12)
     assert mine.deviance == pytest.approx(2 * theirs.cost, rel=2e-3)
     assert np.all(mine.step >= lower - 1e-12)
+
+
+def scattered(seed=0):
+    slopes, residual = problem(seed)
+    sd, now = np.array([0.02, 0.05]), np.array([0.01, -0.03])
+    return slopes, residual, trial_gram(residual, slopes, 0.3, (1, 3), sd, now), sd, now
+
+
+def test_what_the_linearisation_promises_is_the_plain_sum_of_squares():
+    slopes, residual, gram, sd, now = scattered()
+    step, moved = np.linspace(-0.2, 0.3, 5), np.array([0.03, -0.01])
+    rest = residual - slopes @ step - slopes[:, [1, 3]] @ moved
+    direct = rest @ rest / 0.09 / 2.5 + np.sum(((now + moved) / sd) ** 2)
+    assert gram.after(step, moved, 2.5) == pytest.approx(direct)
+
+
+def test_the_pull_on_the_scatter_is_minus_half_the_gradient():
+    _, _, gram, _, _ = scattered()
+    step, moved, h = np.linspace(-0.2, 0.3, 5), np.array([0.03, -0.01]), 1e-6
+    for k, pull in enumerate(gram.pull(step, moved, 2.5)):
+        ends = [gram.after(step, moved + s * h * np.eye(2)[k], 2.5) for s in (1, -1)]
+        assert pull == pytest.approx(-(ends[0] - ends[1]) / (2 * h) / 2, rel=1e-4)
+
+
+def test_scatter_that_is_held_is_a_constant_of_the_elimination():
+    slopes, residual, gram, sd, now = scattered()
+    held = gram.eliminated(2.0, np.array([np.nan, 0.07]))
+    shifted = residual - 0.07 * slopes[:, 3]
+    alone = trial_gram(shifted, slopes, 0.3, (1,), sd[:1], now[:1]).eliminated(2.0)
+    matrix = alone.matrix.copy()
+    matrix[-1, -1] += ((now[1] + 0.07) / sd[1]) ** 2
+    assert held.matrix == pytest.approx(matrix, rel=1e-8, abs=1e-6)
+    assert held.back[1, -1] == pytest.approx(0.07)
+    assert np.all(held.back[1, :-1] == 0)

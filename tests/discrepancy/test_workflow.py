@@ -60,7 +60,7 @@ def test_nothing_hidden_is_nothing_found(tmp_path, capsys):
 @pytest.mark.slow
 def test_a_tether_is_named_and_closes_the_gap(tmp_path, capsys):
     folder, truth = lab(tmp_path / "set", ("tether_drag",))
-    _, said = ask(discrepancy, folder, capsys, "--payoff", out=tmp_path / "out")
+    _, said = ask(discrepancy, folder, capsys, "--maze", "mazes/first.yaml", out=tmp_path / "out")
     assert said["verdict"] == "named"
     (effect,) = said["effects"]
     assert effect["name"] == "tether_drag"
@@ -73,7 +73,13 @@ def test_a_tether_is_named_and_closes_the_gap(tmp_path, capsys):
     assert gains["promised"] > gains["after"] > gains["before"]  # a hose makes the promise hollow
     played = steady_gait(robot, Gait.of_record(said["payoff"]["gait_after"]))
     assert played.speed_m_s == pytest.approx(gains["after"], rel=1e-3)
+    rides = said["payoff"]["maze"]
+    assert rides["after"]["driven"]["reached"] and rides["after"]["driven"]["collisions"] == 0
+    # the plan was made for the robot that plays it; the other one did not know of the hose
+    assert rides["after"]["blind_end_away_m"] < 1e-6 < 0.05 < rides["before"]["blind_end_away_m"]
+    assert rides["after"]["blind_clearance_m"] > 0.0049
     page = (tmp_path / "out" / "report.html").read_text()
+    assert page.count("data:image/png") == 4 and "In a maze" in page
     assert "tether_drag" in page and "http" not in page and "data:image/png" in page
 
 

@@ -1,0 +1,60 @@
+"""A straight gait with its turning companions: the smallest table with which a robot finds its way."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from srs_opt.errors import NoAnswerError
+from srs_opt.gait import Gait, Wave
+from srs_opt.gait_opt.aim import end_for_end, in_step, leaned
+from srs_opt.gait_opt.table import GaitTable, TableGait
+from srs_opt.orbit.steady import steady_gait
+from srs_opt.robot import Robot
+
+TICK_S = 0.001
+OFFSETS = (0.0, 0.15, 0.3, 0.45, 0.6, 0.7, 0.8, 0.9)
+SLOWEST_M_S = 0.03
+
+
+def leaned_family(robot: Robot, gait: Gait, model: str = "complex") -> GaitTable:
+    """Return a straight gait leaned to either side, forward and backward, in the controller's ticks.
+
+    Parameters
+    ----------
+    robot : Robot
+    gait : Gait
+        Straight.
+    model : {"complex", "simplified"}
+    """
+    # an offset makes a wave's on-intervals longer by asin(offset)/pi of the cycle
+    return _family(robot, lambda offset: leaned(gait, math.asin(offset) / math.pi), model)
+
+
+def wave_family(
+    robot: Robot, frequency_hz: float, pressure_kpa: float, lag_rad: float, model: str = "complex"
+) -> GaitTable:
+    """Return the family of a uniform wave, its offset to either side, forward and backward."""
+
+    def leaning(offset: float) -> Gait:
+        return Wave.uniform(robot.segments, frequency_hz, pressure_kpa, lag_rad, offset).gait()
+
+    return _family(robot, leaning, model)
+
+
+def _family(robot: Robot, leaning: Callable[[float], Gait], model: str) -> GaitTable:
+    entries = []
+    for offset in [sign * size for size in OFFSETS for sign in ((1, -1) if size else (1,))]:
+        for way, turned in (("", _unchanged), (" back", end_for_end)):
+            try:
+                orbit = steady_gait(robot, in_step(turned(leaning(offset)), TICK_S), model)
+            except NoAnswerError:
+                continue
+            entry = TableGait.of_orbit(f"{offset:+g}{way}", orbit)
+            if abs(entry.speed_m_s) > SLOWEST_M_S:
+                entries.append(entry)
+    return GaitTable(robot.name, robot.fingerprint(), model, tuple(entries))
+
+
+def _unchanged(gait: Gait) -> Gait:
+    return gait
