@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -56,6 +56,9 @@ class Report:
         self._add(Problem(file, line, message, "warning"))
 
     def _add(self, problem: Problem) -> None:
+        # a quoted cell may hold line ends, and what it is quoted in must stay one line
+        message = "".join(c if c.isprintable() else " " for c in problem.message)
+        problem = replace(problem, message=message)
         key = (problem.file, problem.severity)
         count = self._counts[key] = self._counts.get(key, 0) + 1
         if count <= MAX_PER_FILE:

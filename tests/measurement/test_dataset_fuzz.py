@@ -66,6 +66,20 @@ def read(folder):
         load_dataset(folder)
 
 
+def test_a_cell_that_runs_over_lines_is_quoted_in_one(sound):
+    track = sound / "trials" / "t1.csv"
+    kept = track.read_bytes()
+    lines = kept.decode().splitlines()
+    lines[3] = lines[3].replace(",", ',"', 1)
+    lines[5] += '"'
+    try:
+        track.write_text("\n".join(lines) + "\n")
+        read(sound)
+        assert all("\n" not in p.message for p in problems(sound))
+    finally:
+        track.write_bytes(kept)
+
+
 @pytest.mark.parametrize("file", FILES)
 @given(data=st.data())
 @quiet
