@@ -22,6 +22,7 @@ from srs_opt.measurement.records import Trial
 
 NULL_ITERATIONS, POLISH = 12, 40
 DEEPEST, ROUNDS = 4, 6  # effects at once; additions or exchanges in all
+DEEPEST_BRIEF = 3  # with the first seconds of a few trials
 # Deviance within which two sets of effects cannot be told apart. The truth falls behind a rival by D with
 # probability Phi(-sqrt(D)) at worst, whatever separates the two: under 1 % here, so that the sets that are
 # kept hold the truth at 95 % with several rivals.
@@ -82,6 +83,7 @@ class Search:
         self.seed = seed
         self._report = report or (lambda message: None)
         self.quick = tuple(quick) or self.trials
+        self.deepest = DEEPEST
         self._fits: dict[tuple[frozenset[str], bool], Hypothesis] = {}
 
     @property
@@ -186,7 +188,7 @@ class Search:
         current, ended = self._begun(null)
         for _ in range(0 if ended else ROUNDS):
             depth = len(current.hypothesis.candidates)
-            if depth >= DEEPEST:
+            if depth >= self.deepest:
                 break
             better = self._refit(current, self._proposals(current, depth), _MOST_REFITS[depth])
             better = self._swapped(current, better)
@@ -206,6 +208,7 @@ class Search:
         if self.quick == self.trials:
             return null, False
         brief = Search(self.experiment, self.base, self.candidates, self.quick, self.seed, self._report)
+        brief.deepest = DEEPEST_BRIEF
         brief._fits = {(names, False): h for (names, quick), h in self._fits.items() if quick}
         first = brief.calibrate(null.hypothesis.fit.point)
         if first is None:
@@ -213,8 +216,10 @@ class Search:
         start = brief.examine(first)
         best, fitted = brief.run(start)
         self._fits |= {(names, True): h for (names, _), h in brief._fits.items()}
-        limit = _cost(best.hypothesis) + 2 * RIVAL
-        near = [h for h in fitted if h.candidates and _cost(h) < limit]
+        near = [best.hypothesis]
+        if brief._settled(start, best):  # else it has no rivals: it explains nothing yet
+            most, limit = len(best.hypothesis.candidates), _cost(best.hypothesis) + 2 * RIVAL
+            near = [h for h in fitted if 0 < len(h.candidates) <= most and _cost(h) < limit]
         better = self._best_of_whole(near) if best.hypothesis.candidates else None
         if better is None or not self._worth(better, null.hypothesis):
             return null, False
