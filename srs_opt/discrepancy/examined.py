@@ -14,7 +14,7 @@ ADEQUATE = 0.01  # level at which a fitted model is rejected
 # Friction's smoothing is numerical, and its shape is nobody's physics: long data see the difference. What is
 # left of a gap is put down to it while it is this share of the noise's variance and of the gap's, and asks
 # for nothing known at a size that matters: gaits near a change of theirs show a thousandth of a wheel's toe.
-OF_NOISE, OF_GAP = 0.02, 0.005
+OF_NOISE, OF_GAP = 0.02, 0.01
 TELLING = 0.1  # of an effect's typical size
 FALSE_NAME = 0.002  # family-wise level for adding an effect
 
