@@ -157,15 +157,10 @@ def frame(kind: int, seq: int, payload: bytes = b"") -> bytes:
     return bytes(out + bytes([FLAG]))
 
 
-def select(seq: int, gait: int) -> bytes:
-    """Return the command to play a gait from the end of the present cycle on."""
-    return frame(Command.SELECT, seq, struct.pack("<H", gait))
-
-
-def cycle(
-    seq: int, then: int | None, period: int, pressure_pa: int, events: Sequence[tuple[int, int]], words: int
+def cycle_payload(
+    then: int | None, period: int, pressure_pa: int, events: Sequence[tuple[int, int]], words: int
 ) -> bytes:
-    """Return the command to play one cycle, given in ticks, from the end of the present cycle on.
+    """Return the payload of the command to play one cycle from the end of the present cycle on.
 
     Parameters
     ----------
@@ -178,7 +173,7 @@ def cycle(
     payload = struct.pack("<HHIB", NONE if then is None else then, period, pressure_pa, len(events))
     for tick, mask in events:
         payload += struct.pack("<H", tick) + mask.to_bytes(4 * words, "little")
-    return frame(Command.CYCLE, seq, payload)
+    return payload
 
 
 @dataclass

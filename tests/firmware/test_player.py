@@ -144,10 +144,8 @@ def test_a_sent_cycle_is_played_once(tmp_path):
     line = flashed(tmp_path)
     line.select(0)
     line.ticks(SETTLE + 50)
-    line.seq += 1
     events = [(0, 0b0110), (25, 0b1001), (45, 0b0101)]
-    line.controller.receive(protocol.cycle(line.seq, 1, 70, 45_000, events, 1))
-    status = line.answer()
+    status = line.command(Command.CYCLE, protocol.cycle_payload(1, 70, 45_000, events, 1))
     assert status.result is Fault.OK and status.has_pending and status.pending is None
     played, pressure = line.ticks(50 + 70 + 80)
     joining = played[50:120]
@@ -176,9 +174,8 @@ def test_a_cycle_that_cannot_be_played_is_refused_and_changes_nothing(tmp_path, 
     line = flashed(tmp_path)
     line.select(0)
     line.ticks(SETTLE + 50)
-    line.seq += 1
-    line.controller.receive(protocol.cycle(line.seq, 1, period, pressure, events, 1))
-    assert line.answer().result is Fault.REFUSED_CYCLE
+    status = line.command(Command.CYCLE, protocol.cycle_payload(1, period, pressure, events, 1))
+    assert status.result is Fault.REFUSED_CYCLE
     slow = two_gaits()[0][1]
     played, _ = line.ticks(150)
     np.testing.assert_array_equal(played, [slow.valve((k + 50.5) * 1e-3 % 0.1) for k in range(150)])
