@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from planners.drive.contact import BodyWatch
 from planners.drive.foresight import Foresight
 from planners.drive.halt import halt
+from planners.drive.plant import Plant, SimulatedPlant
 from planners.drive.track import Choice, Learned, Where, by_plan, choose, nearest_node, reference_of
-from planners.motion.robots import undelayed
 from planners.plan.answer import Plan
 from planners.plan.solve import solve_with_lattice
 from planners.search.problem import ROUNDING_M, Problem
@@ -22,7 +22,6 @@ from planners.search.tree import Root
 from srs_opt.errors import InputError, NoAnswerError
 from srs_opt.model.parameters import valve_delay_s
 from srs_opt.robot import Robot
-from srs_opt.simulate.integrate import Integrator
 from srs_opt.simulate.timeline import Timeline
 
 Array = NDArray[np.float64]
@@ -102,21 +101,18 @@ def execute(
         raise InputError(
             f"--true-robot '{robot.name}' has {robot.links} links, the plan is for {problem.robot.links}"
         )
-    return _Drive(problem, plan, robot, tell).go()
+    return Drive(problem, plan, SimulatedPlant(problem, robot), tell).go()
 
 
-class _Drive:
+class Drive:
     """One drive: the robot's state, the plan being followed, what was learned."""
 
-    def __init__(self, problem: Problem, plan: Plan, robot: Robot, tell: Callable[[str], None]) -> None:
-        self.problem, self.tell = problem, tell
-        # commands reach the valves late by a constant: it is waited once, before the first cycle
-        self.run = Integrator(undelayed(robot), problem.gaits.model)
-        self.watch = BodyWatch(problem, robot, self.run)
+    def __init__(self, problem: Problem, plan: Plan, plant: Plant, tell: Callable[[str], None]) -> None:
+        self.problem, self.plant, self.tell = problem, plant, tell
+        self.watch = BodyWatch(problem, plant.robot, plant.run)
         self.foresight = Foresight(problem)
-        self.delay_s = valve_delay_s(robot)
-        start = problem.start
-        self.state = self.run.rest(start.x, start.y, start.heading)
+        self.delay_s = valve_delay_s(plant.robot)
+        self.state = plant.state
         self.before = problem.motion.rest
         self.learned = Learned()
         self.replans = self.halts = 0
@@ -126,9 +122,7 @@ class _Drive:
 
     def _follow(self, plan: Plan) -> None:
         self.plan, self.reference = plan, reference_of(self.problem, plan)
-        self.ends = np.array(
-            [self.problem.as_planned(self.state)[:4], *(state[:4] for state in plan.certificate.states)]
-        )
+        self.ends = np.array([self.state[:4], *(state[:4] for state in plan.certificate.states)])
         self.gaits_before = np.array([self.before, *plan.gaits])
         self.node = self.idle = 0
 
@@ -169,10 +163,9 @@ class _Drive:
         forbids it.
         """
         where = Where(self.state[:3].copy(), self.before, float(self.state[3]))
-        state = self.problem.as_planned(self.state)
-        planned = self._gait_by_plan(state)
+        planned = self._gait_by_plan(self.state)
         enough_m = self.foresight.enough_m
-        if planned is not None and self._room_m(state, planned) > enough_m:
+        if planned is not None and self._room_m(self.state, planned) > enough_m:
             return by_plan(self.problem, where, self.learned, planned)
         tried: list[Choice] = []
         second, most_m = None, LEAST_ROOM_M
@@ -182,7 +175,7 @@ class _Drive:
             tried.append(choice)
             if choice.clearance_m < STOP_CLEARANCE_M:
                 break
-            room_m = self._room_m(state, choice.gait)
+            room_m = self._room_m(self.state, choice.gait)
             if room_m > enough_m:
                 return choice
             if room_m > most_m:
@@ -211,7 +204,7 @@ class _Drive:
         try:
             result = solve_with_lattice(
                 relaxed,
-                root=Root(self.problem.as_planned(self.state), self.before, slack),
+                root=Root(self.state, self.before, slack),
                 time_limit_s=20.0,
                 max_nodes=REPLAN_CYCLES,
             )
@@ -225,18 +218,18 @@ class _Drive:
     def _cycle(self, index: int) -> str | None:
         """Play one cycle; return what ended the drive, if anything."""
         gait = self.problem.gaits.gaits[index].gait
-        begin, before = self.state[:3].copy(), self.problem.as_planned(self.state)
+        begin, before = self.state[:3].copy(), self.state
         cycle = Timeline.of_gait(gait, gait.period_s)
-        trajectory = self.run.run(cycle, self.state)
+        trajectory = self.plant.play(cycle, index)
         arrived = self.watch.look(trajectory.time_s, trajectory.pose, trajectory.kappa)
-        self.state = trajectory.final
+        self.state = self.plant.state
         self.played.append(index)
         self.before = index
         if self.watch.touched:
             return "contact"
         if arrived:
             return "arrived"
-        self.foresight.learn(before, cycle, self.problem.as_planned(self.state))
+        self.foresight.learn(before, cycle, self.state)
         c, s = math.cos(begin[2]), math.sin(begin[2])
         dx, dy, turn = self.state[:3] - begin
         observed = np.array([c * dx + s * dy, c * dy - s * dx, turn])
@@ -254,9 +247,9 @@ class _Drive:
     def _halt(self) -> bool:
         """Bring the robot to rest where there is room for it; return whether it came to no harm."""
         self.halts += 1
-        trajectory = self.run.run(halt(self.foresight, self.problem.as_planned(self.state)), self.state)
+        trajectory = self.plant.play(halt(self.foresight, self.state), None)
         self.watch.look(trajectory.time_s, trajectory.pose, trajectory.kappa, ends=False)
-        self.state = trajectory.final
+        self.state = self.plant.state
         self.before = self.problem.motion.rest
         if not self.watch.touched:
             self.tell(f"cycle {len(self.played)}: halted, looking for a way from rest")

@@ -19,7 +19,7 @@ LAYERS = (
     ("srs_opt.orbit",),
     ("srs_opt.simulate.run", "srs_opt.simulate.figures", "srs_opt.simulate.export"),
     ("srs_opt.gait_opt", "srs_opt.gait_map"),
-    ("srs_opt.gait_file",),
+    ("srs_opt.gait_file", "srs_opt.controller"),
     ("srs_opt.measurement",),
     ("srs_opt.drive",),
     ("srs_opt.calibrate",),
@@ -35,6 +35,7 @@ LAYERS = (
         "planners.search.follow",
         "planners.search.ompl_geometric",
     ),
+    ("planners.pilot",),
 )
 # a robot file names effects, so the catalogue of effects checks that part of the file
 ALLOWED = {("srs_opt.robot", "srs_opt.model.effects")}

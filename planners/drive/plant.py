@@ -1,0 +1,59 @@
+"""The robot that is driven: simulated here, or a real one behind a line and a camera (planners.pilot)."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planners.motion.robots import undelayed
+from planners.search.problem import Problem
+from srs_opt.robot import Robot
+from srs_opt.simulate.integrate import Integrator, Trajectory
+from srs_opt.simulate.timeline import Timeline
+
+Array = NDArray[np.float64]
+
+
+class Plant(Protocol):
+    """What is driven.
+
+    Attributes
+    ----------
+    robot : Robot
+        For its body's width and valve delay.
+    run : Integrator
+        Of that robot, for the shape of its body.
+    state : array
+        Now, or where the last motion will have ended, as the planned robot's model has it.
+    """
+
+    robot: Robot
+    run: Integrator
+    state: Array
+
+    def play(self, timeline: Timeline, gait: int | None) -> Trajectory:
+        """Play valves from now on; return the motion. `gait` is the table entry, if it is one whole cycle."""
+
+
+class SimulatedPlant:
+    """A robot's full dynamic model, from rest at the problem's start.
+
+    Commands reach its valves late by a constant; that delay is waited once, before the first cycle.
+    """
+
+    def __init__(self, problem: Problem, robot: Robot) -> None:
+        self.robot = robot
+        self.run = Integrator(undelayed(robot), problem.gaits.model)
+        start = problem.start
+        self._problem = problem
+        self._state = self.run.rest(start.x, start.y, start.heading)
+        self.state = problem.as_planned(self._state)
+
+    def play(self, timeline: Timeline, gait: int | None) -> Trajectory:
+        """Integrate the model over the timeline."""
+        trajectory = self.run.run(timeline, self._state)
+        self._state = trajectory.final
+        self.state = self._problem.as_planned(self._state)
+        return trajectory

@@ -1,0 +1,1 @@
+"""What a microcontroller plays: programs of gaits and plans in ticks, and their C source."""
