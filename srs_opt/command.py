@@ -96,16 +96,8 @@ def make_parser(
 
 
 def chosen_model(options: argparse.Namespace, robot: Robot) -> str:
-    """Return the model that --model names, else the robot's own.
-
-    Raises
-    ------
-    InputError
-        If the compliant model is asked for a robot without a stiffness.
-    """
-    from srs_opt.model.parameters import Structure
-
-    return Structure.of(robot, options.model).model
+    """Return the model that --model names, else the robot's own."""
+    return str(options.model or robot.own_model)
 
 
 def run_command(
