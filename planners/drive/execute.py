@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from planners.drive.contact import BodyWatch
 from planners.drive.foresight import Foresight
 from planners.drive.halt import halt
-from planners.drive.plant import Plant, SimulatedPlant
+from planners.drive.plant import Plant, PlantStopped, SimulatedPlant
 from planners.drive.track import Choice, Learned, Where, by_plan, choose, nearest_node, reference_of
 from planners.plan.answer import Plan
 from planners.plan.solve import solve_with_lattice
@@ -133,13 +133,30 @@ class Drive:
             gait = self._next_gait()
             if gait is None:
                 reason = "no gait keeps the body off the walls and no other way was found"
-                if self.halts == MOST_HALTS or not self._halt() or not self._plan_anew():
+                if self.halts == MOST_HALTS or not self._halt():
+                    return self._stop(reason)
+                self.tell(f"cycle {len(self.played)}: halted, looking for a way from rest")
+                if not self._plan_anew():
                     return self._stop(reason)
                 continue
-            outcome = self._cycle(gait)
+            try:
+                outcome = self._cycle(gait)
+            except PlantStopped as stopped:
+                if not self._go_on_after(stopped):
+                    return self._done(stopped.reason)
+                continue
             if outcome is not None:
+                if outcome == "arrived" and not self.plant.waits:
+                    self._halt()
                 return self._done(outcome)
         return self._stop(f"the goal was not reached within {self.most_cycles} cycles")
+
+    def _go_on_after(self, stopped: PlantStopped) -> bool:
+        """Look for another way from where the robot was stopped, if there may be one."""
+        self.state, self.before = self.plant.state, self.problem.motion.rest
+        self.halts += 1
+        self.tell(f"cycle {len(self.played)}: {stopped.reason}")
+        return stopped.may_go_on and self.halts <= MOST_HALTS and self._plan_anew()
 
     def _next_gait(self) -> int | None:
         choice = self._choice()
@@ -148,6 +165,8 @@ class Drive:
             self.replans += 1
             why = "strayed or stuck" if lost else "nothing fits"
             self.tell(f"cycle {len(self.played)}: {why}, planning anew")
+            if not self.plant.waits and self.before != self.problem.motion.rest:
+                return None  # it cannot be planned in motion: halt first
             if self._plan_anew():
                 choice = self._choice()
         if choice.clearance_m < STOP_CLEARANCE_M:
@@ -251,8 +270,6 @@ class Drive:
         self.watch.look(trajectory.time_s, trajectory.pose, trajectory.kappa, ends=False)
         self.state = self.plant.state
         self.before = self.problem.motion.rest
-        if not self.watch.touched:
-            self.tell(f"cycle {len(self.played)}: halted, looking for a way from rest")
         return not self.watch.touched
 
     def _done(self, outcome: str) -> Execution:
