@@ -7,6 +7,7 @@ a goal 3 m beyond its field. Document types and entities are refused, so nothing
 from __future__ import annotations
 
 import math
+import os
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 from typing import Any
@@ -18,10 +19,18 @@ from planners.maze.maze import MAX_EXTENT_M, Maze
 from planners.maze.places import Pose
 from planners.maze.walls import Walls
 from srs_opt.errors import InputError
+from srs_opt.files import read_text
 
 PAD_M = 4.0
 UPRIGHT_RAD = 0.05
 MAX_BODIES = 100_000
+Shape = tuple[Any, float]
+_UNIT = "<model><link><collision><geometry>{}</geometry></collision></link></model>"
+_UNIT_SHAPES = {
+    "unit_box": _UNIT.format("<box><size>1 1 1</size></box>"),
+    "unit_cylinder": _UNIT.format("<cylinder><radius>0.5</radius></cylinder>"),
+    "unit_sphere": _UNIT.format("<sphere><radius>0.5</radius></sphere>"),
+}
 _FLAT = ("plane", "empty", "heightmap")
 _SCENERY = ("sun", "ground_plane")
 
@@ -34,19 +43,7 @@ def read_world(text: str, source: str) -> Maze:
     InputError
         Naming the line (broken XML) or the model.
     """
-    if "<!DOCTYPE" in text or "<!ENTITY" in text:
-        raise InputError(
-            f"{source}: a document type or an entity is declared; a Gazebo world needs none, remove it"
-        )
-    try:
-        root = ElementTree.fromstring(text)
-    except ElementTree.ParseError as error:
-        line = error.position[0]
-        raise InputError(
-            f"{source}:{line}: not valid XML: {str(error)[:80]} (expected a Gazebo world)"
-        ) from error
-    except ValueError as error:  # an encoding that contradicts the text
-        raise InputError(f"{source}: not valid XML: {str(error)[:80]} (expected a Gazebo world)") from error
+    root = _parsed(text, source)
     world = root if root.tag == "world" else root.find("world")
     if world is None:
         raise InputError(f"{source}: no <world> in it (expected a Gazebo world: <sdf><world>...)")
@@ -60,29 +57,81 @@ def read_world(text: str, source: str) -> Maze:
     return Maze(Path(source).stem, bounds, walls, source=source)
 
 
-def _shapes(world: ElementTree.Element, source: str) -> list[tuple[Any, float]]:
+def _parsed(text: str, source: str) -> ElementTree.Element:
+    """Return the root of an XML document that declares nothing."""
+    if "<!DOCTYPE" in text or "<!ENTITY" in text:
+        raise InputError(
+            f"{source}: a document type or an entity is declared; a Gazebo world needs none, remove it"
+        )
+    try:
+        root = ElementTree.fromstring(text)
+    except ElementTree.ParseError as error:
+        line = error.position[0]
+        raise InputError(
+            f"{source}:{line}: not valid XML: {str(error)[:80]} (expected a Gazebo world)"
+        ) from error
+    except ValueError as error:  # an encoding that contradicts the text
+        raise InputError(f"{source}: not valid XML: {str(error)[:80]} (expected a Gazebo world)") from error
+    return root
+
+
+def _shapes(world: ElementTree.Element, source: str) -> list[Shape]:
+    moved = {model.get("name"): model.find("pose") for model in world.findall("state/model")}
+    shapes: list[Shape] = []
     for include in world.findall("include"):
         uri = (include.findtext("uri") or "").strip()
-        if uri.rstrip("/").rsplit("/", 1)[-1] not in _SCENERY:
-            raise InputError(
-                f"{source}: <include> of {uri[:60]!r}: its shape is not in this file; write the model out"
-            )
-    moved = {model.get("name"): model.find("pose") for model in world.findall("state/model")}
-    shapes: list[tuple[Any, float]] = []
+        if uri.rstrip("/").rsplit("/", 1)[-1] in _SCENERY:
+            continue
+        where = f"{source}: <include> of {uri[:60]!a}"
+        pose = moved.get(include.findtext("name"), include.find("pose"))
+        shapes += _included(uri, _pose(pose, where), where, source)
     for model in world.findall("model"):
         where = f"{source}: model '{(model.get('name') or '?')[:60]}'"
         pose = moved.get(model.get("name"))
-        base = _pose(pose if pose is not None else model.find("pose"), where)
-        for link in model.findall("link"):
-            at_link = _compose(base, _pose(link.find("pose"), where))
-            for collision in link.findall("collision"):
-                at = _compose(at_link, _pose(collision.find("pose"), where))
-                shape = _shape(collision.find("geometry"), at, where)
-                if shape is not None:
-                    shapes.append(shape)
+        shapes += _model_shapes(model, _pose(pose if pose is not None else model.find("pose"), where), where)
         if len(shapes) > MAX_BODIES:
             raise InputError(f"{source}: more than {MAX_BODIES} obstacles")
     return shapes
+
+
+def _model_shapes(model: ElementTree.Element, base: Pose, where: str) -> list[Shape]:
+    """Return the shapes of a model placed at `base`."""
+    shapes = []
+    for link in model.findall("link"):
+        at_link = _compose(base, _pose(link.find("pose"), where))
+        for collision in link.findall("collision"):
+            at = _compose(at_link, _pose(collision.find("pose"), where))
+            shape = _shape(collision.find("geometry"), at, where)
+            if shape is not None:
+                shapes.append(shape)
+    return shapes
+
+
+def _included(uri: str, base: Pose, where: str, source: str) -> list[Shape]:
+    """Return the shapes of an included model: one of Gazebo's unit shapes, or written out in model.sdf."""
+    name = uri.removeprefix("model://").removeprefix("file://").strip("/")
+    if name in _UNIT_SHAPES:
+        return _model_shapes(ElementTree.fromstring(_UNIT_SHAPES[name]), base, where)
+    for folder in _model_folders(source):
+        file = folder / name / "model.sdf"
+        if name and ".." not in Path(name).parts and file.is_file():
+            root = _parsed(read_text(file, "a Gazebo model"), str(file))
+            model = root if root.tag == "model" else root.find("model")
+            if model is None:
+                raise InputError(f"{file}: no <model> in it (expected a Gazebo model: <sdf><model>...)")
+            return _model_shapes(model, _compose(base, _pose(model.find("pose"), str(file))), str(file))
+    raise InputError(
+        f"{where}: no model.sdf of that name beside the world, in models/ or on GAZEBO_MODEL_PATH; "
+        "put it there, or write the model out"
+    )
+
+
+def _model_folders(source: str) -> list[Path]:
+    """Return the folders in which models are looked for."""
+    here = Path(source).parent
+    paths = [os.environ.get(name, "") for name in ("GAZEBO_MODEL_PATH", "GZ_SIM_RESOURCE_PATH")]
+    named = [Path(part) for path in paths for part in path.split(os.pathsep) if part]
+    return [here, here / "models", here.parent / "models", *named]
 
 
 def _numbers(text: str | None, count: int, where: str, what: str) -> list[float]:
@@ -116,7 +165,7 @@ def _compose(base: Pose, inner: Pose) -> Pose:
     return Pose(x, y, base.heading + inner.heading)
 
 
-def _shape(geometry: ElementTree.Element | None, at: Pose, where: str) -> tuple[Any, float] | None:
+def _shape(geometry: ElementTree.Element | None, at: Pose, where: str) -> Shape | None:
     if geometry is None or len(geometry) == 0 or geometry[0].tag in _FLAT:
         return None
     kind = geometry[0].tag

@@ -1,4 +1,4 @@
-"""A maze on paper: walls dark grey, start an arrow, goal a green region."""
+"""A maze on paper: walls dark grey, unknown cells light brown, start an arrow, goal a green region."""
 
 from __future__ import annotations
 
@@ -7,14 +7,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 
 from planners.maze.maze import Maze
 from planners.maze.places import Goal, Pose
+from planners.maze.raster import Raster
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 WALL = "#3a3a3a"
+UNKNOWN = "#b9b4a6"
 START = "#1f5fa8"
 GOAL = "#2e8b57"
 RIM = 0.012
@@ -71,14 +74,27 @@ def _fill(axes: Axes, region: shapely.Geometry) -> None:
 
 
 def _draw_raster(axes: Axes, maze: Maze) -> None:
+    raster = maze.raster
+    assert raster is not None  # the caller has looked
+    if raster.unknown is None:
+        _draw_cells(axes, raster, raster.occupied, WALL)
+    else:
+        _draw_cells(axes, raster, raster.occupied & ~raster.unknown, WALL)
+        _draw_cells(axes, raster, raster.unknown, UNKNOWN)
+        taken = "wall" if (raster.occupied & raster.unknown).any() else "free"
+        axes.scatter([], [], marker="s", color=UNKNOWN, label=f"unknown, taken for {taken}")
+    rim = RIM * max(maze.width_m, maze.height_m)  # imshow has moved the limits
+    axes.set_xlim(maze.bounds[0] - rim, maze.bounds[2] + rim)
+    axes.set_ylim(maze.bounds[1] - rim, maze.bounds[3] + rim)
+
+
+def _draw_cells(axes: Axes, raster: Raster, cells: NDArray[np.bool_], color: str) -> None:
     from matplotlib.colors import ListedColormap
     from matplotlib.transforms import Affine2D
 
-    raster = maze.raster
-    assert raster is not None  # the caller has looked
-    thin = max(1, math.ceil(max(raster.occupied.shape) / MAX_PIXELS))
-    rows, columns = raster.occupied.shape
-    cells = np.pad(raster.occupied, ((0, -rows % thin), (0, -columns % thin)))
+    thin = max(1, math.ceil(max(cells.shape) / MAX_PIXELS))
+    rows, columns = cells.shape
+    cells = np.pad(cells, ((0, -rows % thin), (0, -columns % thin)))
     pools = cells.reshape(cells.shape[0] // thin, thin, -1, thin)
     cells = np.asarray(pools.any(axis=(1, 3)))
     step = raster.cell_m * thin
@@ -88,14 +104,11 @@ def _draw_raster(axes: Axes, maze: Maze) -> None:
         origin="lower",
         extent=(0.0, cells.shape[1] * step, 0.0, cells.shape[0] * step),
         transform=turned + axes.transData,
-        cmap=ListedColormap([WALL]),
+        cmap=ListedColormap([color]),
         interpolation="nearest",
         zorder=2,
         aspect="equal",
     )
-    rim = RIM * max(maze.width_m, maze.height_m)  # imshow has moved the limits
-    axes.set_xlim(maze.bounds[0] - rim, maze.bounds[2] + rim)
-    axes.set_ylim(maze.bounds[1] - rim, maze.bounds[3] + rim)
 
 
 def _draw_goal(axes: Axes, goal: Goal) -> None:

@@ -1,16 +1,20 @@
-"""Read a maze from a file of any known format, told by its ending, else by its content."""
+"""Read a maze from a file of any known format, told by its content, else by its ending."""
 
 from __future__ import annotations
 
 import math
+import re
+from codecs import BOM_UTF8
 from pathlib import Path
 
 from planners.maze.barn import read_world
 from planners.maze.maze import MAX_EXTENT_M, Maze
 from planners.maze.micromouse import read_micromouse
+from planners.maze.micromouse_numbers import MAZ_BYTES, read_maz, read_numbers
 from planners.maze.movingai import map_of, read_map, read_scenarios, with_scenario
 from planners.maze.native import maze_from_document
 from planners.maze.places import Goal, Pose, RobotSize
+from planners.maze.raster import Unknown
 from planners.maze.ros import maze_from_map_server
 from srs_opt.document import parse_yaml
 from srs_opt.errors import InputError
@@ -27,11 +31,18 @@ ENDINGS = {
     ".scen": "scenario",
     ".txt": "micromouse",
     ".maz": "micromouse",
+    ".num": "numbers",
     ".world": "world",
     ".sdf": "world",
     ".xml": "world",
 }
-KNOWN = "our maze YAML, a ROS map_server YAML, a MovingAI .map or .scen, a micromouse .txt, a BARN .world"
+KNOWN = (
+    "our maze YAML, a ROS map_server YAML, a MovingAI .map or .scen, a micromouse .txt, .num or .maz, "
+    "a BARN .world"
+)
+HEAD_BYTES = 4096
+_POSTS = re.compile(rb"[o+O.]((---|   )[o+O.])+")
+_SIX_NUMBERS = re.compile(rb"\d+(\s+\d+){5}")
 
 
 def load_maze(
@@ -44,6 +55,7 @@ def load_maze(
     margin_m: float = RobotSize.margin_m,
     start: Pose | None = None,
     goal: Goal | None = None,
+    unknown: Unknown = "wall",
 ) -> Maze:
     """Read a maze.
 
@@ -57,6 +69,8 @@ def load_maze(
         Multiplies all lengths of the file (not those of the robot, `start` or `goal`).
     robot_length_m, body_half_width_m, margin_m : float
         The straight robot and the clearance it keeps, to place it in a start cell.
+    unknown : {"wall", "free"}
+        What unknown cells of a map are taken for.
     start, goal : optional
         Take the place of the file's; whether they are possible, `placement.check_placement` tells.
 
@@ -69,7 +83,7 @@ def load_maze(
         if number is not None and not (0 < number < MAX_EXTENT_M):
             raise InputError(f"{name} must be a number above 0 and below {MAX_EXTENT_M:g}, found {number}")
     size = RobotSize(robot_length_m, body_half_width_m, margin_m).scaled(1 / scale)
-    maze = _read(str(path), cell_m, size).scaled(scale)
+    maze = _read(str(path), cell_m, size, unknown).scaled(scale)
     if not all(math.isfinite(v) and abs(v) <= MAX_EXTENT_M for v in maze.bounds):
         raise InputError(
             f"{path}: the maze reaches beyond {MAX_EXTENT_M:g} m; choose a smaller --cell or --scale"
@@ -77,9 +91,9 @@ def load_maze(
     return maze.with_places(start, goal)
 
 
-def _read(path: str, cell_m: float | None, size: RobotSize) -> Maze:
+def _read(path: str, cell_m: float | None, size: RobotSize, unknown: Unknown) -> Maze:
     file, number = _scenario_number(path)
-    kind = ENDINGS.get(Path(file).suffix.lower()) or _guess(file)
+    kind = _kind(file)
     if cell_m is not None and kind in ("yaml", "world"):
         raise InputError(f"{path}: has its own lengths, a cell size does not apply; use --scale to resize it")
     if kind == "movingai":
@@ -88,12 +102,16 @@ def _read(path: str, cell_m: float | None, size: RobotSize) -> Maze:
         return _read_scenario(file, number, cell_m, size)
     if kind == "micromouse":
         return read_micromouse(read_text(file, "a micromouse maze", MAX_TEXT_BYTES), file, cell_m, size)
+    if kind == "numbers":
+        return read_numbers(read_text(file, "a micromouse maze", MAX_TEXT_BYTES), file, cell_m, size)
+    if kind == "maz":
+        return read_maz(read_bytes(file, "a micromouse maze", MAX_TEXT_BYTES), file, cell_m, size)
     if kind == "world":
         return read_world(read_text(file, "a Gazebo world", MAX_TEXT_BYTES), file)
     document = parse_yaml(read_text(file, "a maze", MAX_YAML_BYTES), file, "a maze")
     if isinstance(document.value, dict) and {"image", "resolution"} & set(document.value):
-        return maze_from_map_server(document)
-    return maze_from_document(document, size)
+        return maze_from_map_server(document, unknown)
+    return maze_from_document(document, size, unknown)
 
 
 def _scenario_number(path: str) -> tuple[str, int]:
@@ -117,17 +135,30 @@ def _read_scenario(file: str, number: int, cell_m: float | None, size: RobotSize
     return with_scenario(maze, scenario, size)
 
 
-def _guess(file: str) -> str:
-    """Return the format of a file whose ending says nothing."""
-    head = read_bytes(file, "a maze", MAX_MAP_BYTES)[:4096].lstrip(b"\xef\xbb\xbf \t\r\n")
-    if head.startswith(b"<"):
+def _kind(file: str) -> str:
+    """Return the format of a file."""
+    ending = Path(file).suffix.lower()
+    try:
+        with open(file, "rb") as stream:
+            head = stream.read(HEAD_BYTES)
+    except (OSError, ValueError):  # the reader of the ending's format says what is wrong
+        return ENDINGS.get(ending, "yaml")
+    text = head.removeprefix(BOM_UTF8).lstrip()
+    first = text.split(b"\n", 1)[0].rstrip()
+    if text.startswith(b"<"):
         return "world"
-    if head.startswith((b"type ", b"height ")):
+    if text.startswith((b"type ", b"height ")):
         return "movingai"
-    if head.startswith(b"version "):
+    if text.startswith(b"version "):
         return "scenario"
-    if head[:1] in (b"o", b"+") and head[1:4] in (b"---", b"   "):
+    if _POSTS.fullmatch(first):
         return "micromouse"
+    if _SIX_NUMBERS.fullmatch(first):
+        return "numbers"
+    if len(head) == MAZ_BYTES and ending == ".maz":
+        return "maz"
+    if ending in ENDINGS:
+        return ENDINGS[ending]
     if b":" in head and b"\0" not in head:
         return "yaml"
     raise InputError(f"{file}: not a maze of a known format (expected {KNOWN})")

@@ -43,7 +43,6 @@ def read_micromouse(
         Side of a cell in metres, wall middle to wall middle (0.18 m, the contest's).
     size : RobotSize, optional
         The robot starts straight, its tail the margin away from the start cell's back wall.
-
     wall_m : float, optional
         Wall thickness in metres (12/180 of a cell).
 
@@ -52,15 +51,41 @@ def read_micromouse(
     InputError
         Naming line and column.
     """
-    cell = cell_m or CONTEST_CELL_M
     across, along, letters = _parse(text, source)
-    rows, columns = letters.shape
-    half = (wall_m or cell * WALL_OF_CELL) / 2
     starts = [(int(r), int(c)) for r, c in np.argwhere(letters == "S")]
     goals = [(int(r), int(c)) for r, c in np.argwhere(letters == "G")]
-    classic = (rows, columns) == (16, 16)
+    classic = letters.shape == (16, 16)
     starts = starts or ([(0, 0)] if classic else [])
     goals = goals or ([(7, 7), (7, 8), (8, 7), (8, 8)] if classic else [])
+    return maze_of_walls(across, along, starts, goals, source, cell_m, size, wall_m)
+
+
+def maze_of_walls(
+    across: NDArray[np.bool_],
+    along: NDArray[np.bool_],
+    starts: list[tuple[int, int]],
+    goals: list[tuple[int, int]],
+    source: str,
+    cell_m: float | None = None,
+    size: RobotSize | None = None,
+    wall_m: float | None = None,
+) -> Maze:
+    """Return the maze of walls between cells.
+
+    Parameters
+    ----------
+    across : ndarray of bool, shape (rows + 1, columns)
+        Walls along x, lowest first.
+    along : ndarray of bool, shape (rows, columns + 1)
+        Walls along y.
+    starts, goals : list of (row, column)
+        At most one start.
+    source, cell_m, size, wall_m
+        As in `read_micromouse`.
+    """
+    cell = cell_m or CONTEST_CELL_M
+    rows, columns = along.shape[0], across.shape[1]
+    half = (wall_m or cell * WALL_OF_CELL) / 2
     boxes: tuple[Box, ...] = tuple((c * cell, r * cell, (c + 1) * cell, (r + 1) * cell) for r, c in goals)
     return Maze(
         name=Path(source).stem,

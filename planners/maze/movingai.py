@@ -1,12 +1,14 @@
 """MovingAI grid maps (.map) and scenarios (.scen), the benchmark format of grid path finding.
 
-Passable: ``.`` and ``G`` (ground) and ``S`` (swamp). Everything else that the format knows is wall:
-``@`` and ``O`` (out of bounds), ``T`` (trees), ``W`` (water).
+Passable: ``.`` and ``G`` (ground) and ``S`` (swamp); in weighted maps also digits from 1 and lower-case
+letters, ground of different cost (which says nothing about a snake's speed and is not used). Everything
+else that the format knows is wall: ``@`` and ``O`` (out of bounds), ``T`` (trees), ``W`` (water).
 """
 
 from __future__ import annotations
 
 import os
+from codecs import BOM_UTF8
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,7 +21,7 @@ from srs_opt.errors import InputError
 
 DEFAULT_CELL_M = 0.1
 """Maps have no unit of length; with this, one cell is as wide as a slim gait needs."""
-PASSABLE = b".GS"
+PASSABLE = b".GS123456789abcdefghijklmnopqrstuvwxyz"
 BLOCKED = b"@OTW"
 _EXPECTED = (
     "expected a MovingAI map: lines 'type octile', 'height H', 'width W', 'map', then H rows of W cells"
@@ -36,7 +38,7 @@ def read_map(data: bytes, source: str, cell_m: float | None = None) -> Maze:
         Naming the line.
     """
     cell = cell_m or DEFAULT_CELL_M
-    lines = data.replace(b"\r\n", b"\n").split(b"\n")
+    lines = data.removeprefix(BOM_UTF8).replace(b"\r\n", b"\n").split(b"\n")
     while len(lines) > 1 and not lines[-1].strip():
         lines.pop()
     height, width, first = _header(lines, source)
@@ -54,7 +56,7 @@ def read_map(data: bytes, source: str, cell_m: float | None = None) -> Maze:
         line, column = (int(v) for v in odd[0])
         letter = ascii(chr(cells[line, column]))
         place = f"{source}:{first + line + 1}: column {column + 1}"
-        raise InputError(f"{place}: unknown cell {letter} (. G S free, @ O T W wall)")
+        raise InputError(f"{place}: unknown cell {letter} (. G S 1-9 a-z free, @ O T W wall)")
     wall = ~np.isin(np.arange(256), list(PASSABLE))
     raster = Raster(wall[cells[::-1]], cell)
     return Maze(Path(source).stem, raster.bounds(), raster=raster, source=source)

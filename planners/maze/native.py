@@ -14,16 +14,16 @@ from numpy.typing import NDArray
 from planners.maze.cells import start_in_cell
 from planners.maze.maze import Maze
 from planners.maze.places import Box, Goal, Pose, RobotSize
-from planners.maze.raster import MAX_CELLS, Raster
+from planners.maze.raster import MAX_CELLS, Raster, Unknown
 from planners.maze.walls import Walls, box_shape
 from srs_opt.document import Document, load_schema, validate
 from srs_opt.errors import InputError
 
 KINDS = ("segment", "box", "polygon", "disc")
-CELLS = "#.SG "
+CELLS = "#.SG ?"
 
 
-def maze_from_document(document: Document, size: RobotSize | None = None) -> Maze:
+def maze_from_document(document: Document, size: RobotSize | None = None, unknown: Unknown = "wall") -> Maze:
     """Return the maze of a parsed file.
 
     Parameters
@@ -31,6 +31,8 @@ def maze_from_document(document: Document, size: RobotSize | None = None) -> Maz
     document : Document
     size : RobotSize, optional
         Places the robot in a start cell S of the grid.
+    unknown : {"wall", "free"}
+        What the grid's cells ``?`` are taken for.
 
     Raises
     ------
@@ -49,7 +51,7 @@ def maze_from_document(document: Document, size: RobotSize | None = None) -> Maz
     walls = Walls.of([_wall(document, ("walls", i), wall) for i, wall in enumerate(value.get("walls", []))])
     raster, start, goal = None, None, None
     if "grid" in value:
-        raster, start, goal, extent = _grid(document, bounds, size or RobotSize())
+        raster, start, goal, extent = _grid(document, bounds, size or RobotSize(), unknown)
         bounds = bounds or extent
     assert bounds is not None  # one of the two was required above
     if "start" in value:
@@ -124,7 +126,7 @@ def _polygon(document: Document, place: tuple[str | int, ...], corners: list[lis
 
 
 def _grid(
-    document: Document, bounds: Box | None, size: RobotSize
+    document: Document, bounds: Box | None, size: RobotSize, unknown: Unknown
 ) -> tuple[Raster, Pose | None, Goal | None, Box]:
     """Return the occupancy grid, the places its S and G mark, and its extent."""
     grid = document.value["grid"]
@@ -143,8 +145,9 @@ def _grid(
         raise document.error(
             ("grid", "rows"), f"{found}, beyond the bounds {list(outer)}; widen them or omit bounds"
         )
-    walls = letters == "#"
-    raster = _covering(walls, cell, (x0, y0), outer)
+    unseen = letters == "?"
+    walls = (letters == "#") | (unseen & (unknown == "wall"))
+    raster = _covering(walls, unseen if unseen.any() else None, cell, (x0, y0), outer)
     if raster is None:
         raise document.error(
             ("grid", "cell"), f"{cell:g} m cells are too small for these bounds (limit {MAX_CELLS} cells)"
@@ -171,7 +174,7 @@ def _letters(document: Document, rows: list[str]) -> NDArray[np.str_]:
         for letter in row:
             if letter not in CELLS:
                 raise document.error(
-                    ("grid", "rows", i), f"unknown cell {letter!r} (# wall, . free, S start, G goal)"
+                    ("grid", "rows", i), f"unknown cell {letter!r} (# wall . free ? unseen S start G goal)"
                 )
     if width * len(rows) > MAX_CELLS:
         raise document.error(
@@ -181,7 +184,11 @@ def _letters(document: Document, rows: list[str]) -> NDArray[np.str_]:
 
 
 def _covering(
-    walls: NDArray[np.bool_], cell: float, corner: tuple[float, float], outer: Box
+    walls: NDArray[np.bool_],
+    unseen: NDArray[np.bool_] | None,
+    cell: float,
+    corner: tuple[float, float],
+    outer: Box,
 ) -> Raster | None:
     """Return the grid, free cells added around it until it covers the bounds (None if too many)."""
 
@@ -194,8 +201,9 @@ def _covering(
     above = more(outer[3] - corner[1] - height * cell)
     if (height + below + above) * (width + left + right) > MAX_CELLS:
         return None
-    padded = np.pad(walls, ((below, above), (left, right)))
-    return Raster(padded, cell, Pose(corner[0] - left * cell, corner[1] - below * cell, 0.0))
+    around = ((below, above), (left, right))
+    origin = Pose(corner[0] - left * cell, corner[1] - below * cell, 0.0)
+    return Raster(np.pad(walls, around), cell, origin, None if unseen is None else np.pad(unseen, around))
 
 
 def _start(

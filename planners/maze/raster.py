@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
 from planners.maze.places import Box, Pose
+
+Unknown = Literal["wall", "free"]
+"""What cells that nobody has seen are taken for."""
 
 MAX_CELLS = 64_000_000
 """Larger grids are refused: 8000 x 8000 cells."""
@@ -30,11 +33,14 @@ class Raster:
         Side of a cell in metres.
     origin : Pose
         Where the outer corner of cell (0, 0) lies and how far the grid is turned about it.
+    unknown : ndarray of bool, shape (rows, columns), optional
+        Cells that nobody has seen, whichever of free and occupied they are taken for (for pictures).
     """
 
     occupied: NDArray[np.bool_]
     cell_m: float
     origin: Pose = field(default_factory=lambda: Pose(0.0, 0.0, 0.0))
+    unknown: NDArray[np.bool_] | None = None
 
     @property
     def size_m(self) -> tuple[float, float]:
@@ -67,7 +73,7 @@ class Raster:
 
     def scaled(self, factor: float) -> Raster:
         """Return the grid with all lengths multiplied by `factor`."""
-        return Raster(self.occupied, self.cell_m * factor, self.origin.scaled(factor))
+        return replace(self, cell_m=self.cell_m * factor, origin=self.origin.scaled(factor))
 
     def distance(self, geometry: Any, limit_m: float = math.inf) -> float:
         """Return the exact distance in metres of a shapely `geometry` to the nearest occupied cell.

@@ -67,7 +67,10 @@ def _grid(raster: Raster, source: str) -> list[str]:
         raise InputError(
             f"{source}: a turned occupancy grid cannot be written as our YAML; keep its own format"
         )
-    rows = ["".join(row) for row in np.where(raster.occupied[::-1], "#", ".")]
+    letters = np.where(raster.occupied, "#", ".")
+    if raster.unknown is not None:
+        letters[raster.unknown] = "?"
+    rows = ["".join(row) for row in letters[::-1]]
     origin = _list((raster.origin.x, raster.origin.y))
     lines = ["grid:", f"  cell: {_number(raster.cell_m)}", f"  origin: {origin}", "  rows:"]
     return lines + [f'    - "{row}"' for row in rows]

@@ -34,7 +34,7 @@ def build_parser() -> Parser:
         "plan mazes/first.yaml --execute --animate out/first.gif",
     )
     parser.add_argument(
-        "maze", metavar="MAZE", help="our YAML, ROS map YAML, MovingAI, micromouse .txt, BARN .world"
+        "maze", metavar="MAZE", help="our YAML, ROS map YAML, MovingAI, micromouse, BARN .world"
     )
     parser.add_argument(
         "--gaits", type=Path, metavar="FILE", help="gait table (default: the one built for this robot)"
@@ -47,6 +47,12 @@ def build_parser() -> Parser:
     )
     parser.add_argument(
         "--scale", type=positive_float, default=1.0, metavar="S", help="factor on the maze's lengths"
+    )
+    parser.add_argument(
+        "--unknown",
+        choices=("wall", "free"),
+        default="wall",
+        help="what unknown cells of a map are taken for (default wall)",
     )
     parser.add_argument(
         "--margin",

@@ -60,6 +60,7 @@ def maze_from(options: argparse.Namespace, robot: Robot) -> Maze:
         margin_m=size.margin_m,
         start=options.start,
         goal=options.goal,
+        unknown=options.unknown,
     )
     check_placement(maze, size)
     return maze

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from srs_opt.gait_opt.table import TableGait
 
 VERSION = 1
+WALL_GREY, UNKNOWN_GREY = 0x3A, 0xB4
 FRAME_S = 1 / 30
 MOST_FRAMES = 6000
 SHOWN_CLEARANCE_M = 0.1
@@ -129,8 +130,10 @@ def _cells(maze: Maze) -> dict[str, Any] | None:
         return None
     from PIL import Image
 
-    alpha = Image.fromarray((raster.occupied[::-1] * np.uint8(255)).astype(np.uint8))
-    picture = Image.merge("LA", (Image.new("L", alpha.size, 0x3A), alpha))
+    unknown = np.zeros_like(raster.occupied) if raster.unknown is None else raster.unknown
+    alpha = Image.fromarray(((raster.occupied | unknown)[::-1] * np.uint8(255)).astype(np.uint8))
+    grey = Image.fromarray(np.where(unknown[::-1], UNKNOWN_GREY, WALL_GREY).astype(np.uint8))
+    picture = Image.merge("LA", (grey, alpha))
     stream = io.BytesIO()
     picture.save(stream, "PNG", optimize=True)
     return {
