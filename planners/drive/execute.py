@@ -130,26 +130,27 @@ class Drive:
         """Drive until something ends it."""
         self.watch.look(np.zeros(1), self.state[None, :3], np.zeros((1, self.problem.robot.segments)))
         while len(self.played) < self.most_cycles:
-            gait = self._next_gait()
-            if gait is None:
-                reason = "no gait keeps the body off the walls and no other way was found"
-                if self.halts == MOST_HALTS or not self._halt():
-                    return self._stop(reason)
-                self.tell(f"cycle {len(self.played)}: halted, looking for a way from rest")
-                if not self._plan_anew():
-                    return self._stop(reason)
-                continue
             try:
-                outcome = self._cycle(gait)
+                ended = self._advance()
             except PlantStopped as stopped:
-                if not self._go_on_after(stopped):
-                    return self._done(stopped.reason)
-                continue
-            if outcome is not None:
-                if outcome == "arrived" and not self.plant.waits:
-                    self._halt()
-                return self._done(outcome)
+                ended = None if self._go_on_after(stopped) else self._done(stopped.reason)
+            if ended is not None:
+                return ended
         return self._stop(f"the goal was not reached within {self.most_cycles} cycles")
+
+    def _advance(self) -> Execution | None:
+        """Play one cycle, or halt and look for another way; return the end of the drive if this was it."""
+        gait = self._next_gait()
+        if gait is None:
+            reason = "no gait keeps the body off the walls and no other way was found"
+            if self.halts == MOST_HALTS or not self._halt():
+                return self._stop(reason)
+            self.tell(f"cycle {len(self.played)}: halted, looking for a way from rest")
+            return None if self._plan_anew() else self._stop(reason)
+        outcome = self._cycle(gait)
+        if outcome == "arrived" and not self.plant.waits:
+            self._halt()
+        return None if outcome is None else self._done(outcome)
 
     def _go_on_after(self, stopped: PlantStopped) -> bool:
         """Look for another way from where the robot was stopped, if there may be one."""
@@ -266,8 +267,13 @@ class Drive:
     def _halt(self) -> bool:
         """Bring the robot to rest where there is room for it; return whether it came to no harm."""
         self.halts += 1
-        trajectory = self.plant.play(halt(self.foresight, self.state), None)
-        self.watch.look(trajectory.time_s, trajectory.pose, trajectory.kappa, ends=False)
+        try:
+            trajectory = self.plant.play(halt(self.foresight, self.state), None)
+        except PlantStopped as stopped:  # it vented by itself
+            if not stopped.may_go_on:
+                raise
+        else:
+            self.watch.look(trajectory.time_s, trajectory.pose, trajectory.kappa, ends=False)
         self.state = self.plant.state
         self.before = self.problem.motion.rest
         return not self.watch.touched

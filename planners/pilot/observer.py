@@ -56,6 +56,9 @@ class Correction:
     latency : Latency
     residual_m : float
         Root mean square of what is left of the places.
+    misfit : float
+        Sum of squares of what is left, over the noise, and of the correction over its prior: how badly the
+        prediction did.
     seen : int
         Sightings used.
     """
@@ -64,6 +67,7 @@ class Correction:
     drift: Array
     latency: Latency
     residual_m: float
+    misfit: float
     seen: int
 
     def apply(self, motion: Trajectory) -> Trajectory:
@@ -98,7 +102,7 @@ def correct(
     late = latency.value_s
     within = [s for s in sightings if 0 < s.time_s - begin_s - late < motion.time_s[-1]]
     if not within:
-        return Correction(np.zeros(3), np.zeros(3), latency, 0.0, 0)
+        return Correction(np.zeros(3), np.zeros(3), latency, 0.0, 0.0, 0)
     at = np.array([s.time_s - begin_s - late for s in within])
     configuration, rate = _interpolated(motion, at)
     blocks = [_rows(*entry, chain) for entry in zip(within, at, configuration, rate)]
@@ -108,10 +112,12 @@ def correct(
     wanted = np.concatenate([*(misses for _, misses in blocks), np.zeros(7)])
     found, *_ = np.linalg.lstsq(matrix, wanted, rcond=None)
     sd = math.sqrt(np.linalg.inv(matrix.T @ matrix)[6, 6])
-    left = (wanted - matrix @ found)[:-7]
+    left = wanted - matrix @ found
     total = min(max(late + float(found[6]), -LONGEST_LATENCY_S), LONGEST_LATENCY_S)
-    residual_m = MARKER_SD_M * float(np.sqrt((left**2).mean()))
-    return Correction(found[:3], found[3:6], Latency(total, sd), residual_m, len(within))
+    residual_m = MARKER_SD_M * float(np.sqrt((left[:-7] ** 2).mean()))
+    return Correction(
+        found[:3], found[3:6], Latency(total, sd), residual_m, float((left**2).sum()), len(within)
+    )
 
 
 def straight_pose(sighting: Sighting, chain: Chain, heading_rad: float) -> Array:

@@ -13,11 +13,13 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from planners.drive.foresight import FADING, FRICTIONS
 from planners.drive.plant import PlantStopped
-from planners.motion.robots import undelayed
+from planners.motion.robots import undelayed, with_friction_times
 from planners.motion.table import body_in_room
 from planners.pilot.observer import Latency, correct, straight_pose
 from planners.pilot.pose import Camera, Sighting
+from planners.pilot.protocol import Status
 from planners.pilot.record import DriveLog
 from planners.pilot.valve_line import Clock, ValveLine
 from planners.plan.certify import clearances
@@ -25,6 +27,7 @@ from planners.search.problem import Problem
 from srs_opt.controller.program import Program, events_of
 from srs_opt.errors import NoAnswerError
 from srs_opt.measurement.chain import chain_of
+from srs_opt.orbit.steady import integrator
 from srs_opt.simulate.integrate import Integrator, Trajectory
 from srs_opt.simulate.shapes import centre_lines
 from srs_opt.simulate.timeline import Timeline
@@ -57,6 +60,8 @@ class PilotedPlant:
         Keeps what was seen and played.
     tell : callable
         Takes messages for people.
+    watch : callable
+        Called with this object some 25 times a second while the robot moves.
     """
 
     waits = False
@@ -69,18 +74,28 @@ class PilotedPlant:
         camera: Camera,
         clock: Clock,
         log: DriveLog,
-        tell: Callable[[str], None],
+        tell: Callable[[str], None] = lambda message: None,
+        watch: Callable[[PilotedPlant], None] = lambda plant: None,
     ) -> None:
         self.robot = problem.robot
         self.run = Integrator(undelayed(problem.robot), problem.gaits.model)
+        # the true robot's friction is not known: the motion is predicted with several, as the driver does
+        self._runs = [
+            integrator(undelayed(with_friction_times(problem.robot, *friction)), problem.gaits.model)
+            for friction in FRICTIONS
+        ]
+        self._misfits = np.zeros(len(FRICTIONS))
         self._problem, self._program = problem, program
-        self._line, self._camera, self._clock, self._log, self._tell = line, camera, clock, log, tell
+        self._line, self._camera, self._clock, self._log = line, camera, clock, log
+        self._tell, self._shows = tell, watch
         self._chain = chain_of(problem.robot)
         self._heading = problem.start.heading
         self._seen: list[Sighting] = []
         self._returned_s = math.inf
         self._thinking_s = 0.0
         self.latency = Latency()
+        self.body = np.zeros((0, 2))  # centre line of the body now, in the room
+        self.clearance_m = math.inf  # of the body now
         self.corrections: list[tuple[float, float]] = []  # offset (m) and residual (m) of every cycle
         self.state = self._resting_state()
 
@@ -104,6 +119,20 @@ class PilotedPlant:
         self._returned_s = self._clock.now()
         return motion
 
+    @property
+    def status(self) -> Status | None:
+        """The controller's last word."""
+        return self._line.status
+
+    @property
+    def valves(self) -> Array:
+        """S of every segment now, as ordered."""
+        return self._log.states_at(self._clock.now(), self.robot.segments)
+
+    def stop_now(self, reason: str) -> None:
+        """Vent and end the drive; raises `PlantStopped`."""
+        self._stop(reason, may_go_on=False)
+
     def stop(self) -> None:
         """Vent, as best as can be done; the controller does the same by itself when it hears nothing."""
         try:
@@ -121,7 +150,7 @@ class PilotedPlant:
             self._line.cycle(None, period, pressure_pa, events, self._program.words)
         else:
             self._line.select(gait, None)
-        motion = self.run.run(timeline, self.state)
+        motions = [run.run(timeline, self.state) for run in self._runs]
         begin_s = self._wait_for_cycle(cycles)
         self._log.played(begin_s, timeline)
         lead_s = 0.0 if ends else self._lead_s()
@@ -131,9 +160,12 @@ class PilotedPlant:
             self._wait()
             if self._clock.now() > look_s:
                 look_s += LOOK_S
-                self._watch(motion, begin_s)
+                self._watch(motions[int(self._misfits.argmin())], begin_s)
         self._look()
-        correction = correct(motion, begin_s, self._seen, self.latency, self._chain)
+        corrections = [correct(m, begin_s, self._seen, self.latency, self._chain) for m in motions]
+        self._misfits = FADING * self._misfits + [c.misfit for c in corrections]
+        likely = int(self._misfits.argmin())
+        motion, correction = motions[likely], corrections[likely]
         self.latency = correction.latency
         self.corrections.append((float(np.hypot(*correction.offset[:2])), correction.residual_m))
         motion = correction.apply(motion)
@@ -182,6 +214,10 @@ class PilotedPlant:
             return
         left = motion.time_s > self._clock.now() - begin_s
         corrected = correction.apply(motion)
+        at = np.searchsorted(motion.time_s, [self._clock.now() - begin_s]).clip(0, motion.time_s.size - 1)
+        lines = body_in_room(centre_lines(self.run, motion.kappa[at]), corrected.pose[at])
+        self.body, self.clearance_m = lines[0], float(clearances(self._problem, lines)[0])
+        self._shows(self)
         off_m = float(np.hypot(*(corrected.pose - motion.pose)[-1, :2]))
         if off_m > STRAY_M:
             self._stop(f"strayed by {1e3 * off_m:.0f} mm from the predicted motion", may_go_on=True)
@@ -194,7 +230,7 @@ class PilotedPlant:
         """Wait until the vented robot stands still; return the motion, ending where it was seen to rest."""
         before = self.state if motion is None else motion.final
         vent = timeline.part(slice(_last_push(timeline) + 1, None))
-        coasting = self.run.run(vent, before)
+        coasting = self._runs[int(self._misfits.argmin())].run(vent, before)
         if motion is not None:
             coasting = _joined(motion, coasting)
         self._log.played(self._clock.now(), vent)
