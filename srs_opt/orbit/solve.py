@@ -19,7 +19,8 @@ from srs_opt.model.parameters import Structure
 from srs_opt.orbit.laps import Lapped, lap, plain_lap
 from srs_opt.simulate.integrate import LOOSE, TOLERANCE_M_S, Integrator
 from srs_opt.simulate.mesh import Mesh
-from srs_opt.simulate.rosenbrock import BODY_STATES, LEVER_M
+from srs_opt.simulate.rosenbrock import BODY_STATES
+from srs_opt.simulate.tableau import LEVER_M
 from srs_opt.simulate.together import Search
 
 _NEWTON_STEPS = 30
