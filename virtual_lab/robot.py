@@ -103,7 +103,8 @@ class _Terminal:
 
 def serve(world: World, terminal: _Terminal, camera: socket.socket, end_s: float) -> None:
     """Keep the world at real time until `end_s` seconds have passed or a signal comes."""
-    begun = time.monotonic()
+    world.sleep(0.05)  # loads compiled code
+    begun = time.monotonic() - world.now()
     late_told = False
     while (passed := time.monotonic() - begun) < end_s:
         if data := terminal.read():

@@ -232,7 +232,7 @@ class PilotedPlant:
         vent = timeline.part(slice(_last_push(timeline) + 1, None))
         coasting = self._runs[int(self._misfits.argmin())].run(vent, before)
         if motion is not None:
-            coasting = _joined(motion, coasting)
+            coasting = motion.then(coasting)
         self._log.played(self._clock.now(), vent)
         self.state = self._rest()
         return coasting
@@ -289,14 +289,3 @@ def _split(timeline: Timeline) -> tuple[Timeline, bool]:
     """Return the part up to the last push, and whether the valves are vented after it."""
     last = _last_push(timeline)
     return timeline.part(slice(0, last + 1)), last + 1 < timeline.duration_s.size
-
-
-def _joined(first: Trajectory, second: Trajectory) -> Trajectory:
-    """Return two motions as one."""
-    both = {
-        name: np.concatenate([getattr(first, name), getattr(second, name)[1:]])
-        for name in ("pose", "velocity", "work_j", "kappa", "dkappa")
-    }
-    time_s = np.concatenate([first.time_s, first.time_s[-1] + second.time_s[1:]])
-    error = np.concatenate([first.error_m_s, second.error_m_s])
-    return Trajectory(time_s=time_s, final=second.final, error_m_s=error, **both)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planners.drive.execute import Drive, Execution
+from planners.drive.execute import Drive, Execution, execute
 from planners.pilot.observer import Latency
 from planners.pilot.plant import PilotedPlant
 from planners.pilot.pose import Camera, PoseSource
@@ -100,9 +100,13 @@ def pilot(
     InputError
         If the controller holds another program, or the robot does not lie at the start.
     NoAnswerError
-        If the controller does not answer or no pose comes.
+        If the controller does not answer, no pose comes, or the drive fails on the model already.
     """
     line = connect(port, clock, program)
+    # a rehearsal on the model: it also loads all code, so that the first real decision is not late
+    rehearsal = execute(problem, plan)
+    if not rehearsal.reached:
+        raise NoAnswerError(f"the drive fails on the model already: {rehearsal.reason}")
     log = DriveLog()
     plant = PilotedPlant(problem, program, line, Camera(source), clock, log, tell, watch)
     _check_start(problem, plant.state)
