@@ -9,11 +9,12 @@ import numpy as np
 
 from srs_opt.errors import NoAnswerError
 from srs_opt.model.parameters import Structure, valve_delay_s
-from srs_opt.model.registry import build
+from srs_opt.model.registry import build, state_layout
+from srs_opt.model.state import POSE, VELOCITY, WORK, StateLayout
 from srs_opt.robot import Robot
 from srs_opt.simulate.kernel import Kernel
 from srs_opt.simulate.mesh import Mesh
-from srs_opt.simulate.rosenbrock import BODY_STATES, step_function
+from srs_opt.simulate.rosenbrock import step_function
 from srs_opt.simulate.timeline import Timeline
 from srs_opt.simulate.together import Search, Stretch, alone
 
@@ -27,8 +28,8 @@ TOLERANCE_M_S = 3e-5  # local error of the body speed per step: about 1e-4 of th
 @lru_cache(maxsize=32)
 def step_kernel(structure: Structure) -> Kernel:
     """Return the compiled `step_function`."""
-    parameters, _, actuator = build(structure)
-    sizes = (BODY_STATES + actuator.states, structure.segments, parameters.vector.numel())
+    parameters, _, _ = build(structure)
+    sizes = (state_layout(structure).size, structure.segments, parameters.vector.numel())
     return Kernel(f"step {structure}", sizes, lambda: step_function(structure))
 
 
@@ -46,7 +47,10 @@ class Trajectory:
     work_j : array (n,)
         Friction work since the start.
     kappa, dkappa : array (n, N-1)
-        Curvatures (1/m) and their rates.
+        Curvatures (1/m) of the body and their rates.
+    no_load, no_load_rate : array (n, N-1)
+        Curvatures that the actuators would give without load, and their rates; the body's own in the models
+        that prescribe them.
     final : array
         The whole last state, to go on from.
     error_m_s : array (n-1,)
@@ -59,6 +63,8 @@ class Trajectory:
     work_j: np.ndarray
     kappa: np.ndarray
     dkappa: np.ndarray
+    no_load: np.ndarray
+    no_load_rate: np.ndarray
     final: np.ndarray
     error_m_s: np.ndarray
 
@@ -75,11 +81,12 @@ class Trajectory:
 class Integrator:
     """Runs one robot's model; holds the compiled step and nothing that changes."""
 
-    def __init__(self, robot: Robot, model: str = "complex", *, room: bool = True) -> None:
+    def __init__(self, robot: Robot, model: str | None = None, *, room: bool = True) -> None:
         self.robot = robot
         self.structure = Structure.of(robot, model, room=room)
         self.parameters, self.mechanics, self.actuator = build(self.structure)
-        self.states = BODY_STATES + self.actuator.states
+        self.layout = state_layout(self.structure)
+        self.states = self.layout.size
         self.kernel = step_kernel(self.structure)
         self._room = room
 
@@ -141,7 +148,7 @@ class Integrator:
             np.concatenate(times),
             np.concatenate(states, axis=1),
             np.concatenate(errors),
-            self.actuator.segments,
+            self.layout,
         )
 
     def _alike(
@@ -209,15 +216,19 @@ def _pieces(timeline: Timeline, longest_phases: int = 40) -> list[Timeline]:
     return pieces
 
 
-def _trajectory(time_s: np.ndarray, states: np.ndarray, errors: np.ndarray, segments: int) -> Trajectory:
-    act = states[BODY_STATES:]
+def _trajectory(
+    time_s: np.ndarray, states: np.ndarray, errors: np.ndarray, layout: StateLayout
+) -> Trajectory:
+    actuators = states[layout.actuator]
     return Trajectory(
         time_s=time_s,
-        pose=states[:3].T,
-        velocity=states[3:6].T,
-        work_j=states[6],
-        kappa=act[:segments].T,
-        dkappa=act[segments : 2 * segments].T,
+        pose=states[POSE].T,
+        velocity=states[VELOCITY].T,
+        work_j=states[WORK],
+        kappa=states[layout.kappa].T,
+        dkappa=states[layout.dkappa].T,
+        no_load=actuators[: layout.segments].T,
+        no_load_rate=actuators[layout.segments : 2 * layout.segments].T,
         final=states[:, -1],
         error_m_s=errors,
     )
