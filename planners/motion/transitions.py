@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from planners.motion.table import SAMPLES, MotionTable
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait_opt.table import GaitTable, TableGait
-from srs_opt.orbit.solve import periodic_actuators
+from srs_opt.orbit.actuators import periodic_actuators
 from srs_opt.orbit.steady import integrator
 from srs_opt.robot import Robot
 from srs_opt.simulate.integrate import Integrator

@@ -171,7 +171,7 @@ def _summary(record: dict[str, Any]) -> str:
     lines = [
         f"solved by {record['planner']} in {record['planning_s']:.2f} s: {record['length_m']:.2f} m, "
         f"{record['duration_s']:.1f} s, {sum(s['cycles'] for s in record['steps'])} cycles, clearance "
-        f"{1e3 * record['clearance_m']:.1f} mm, certified"
+        f"at least {1e3 * record['clearance_m']:.1f} mm, certified"
     ]
     if execution := record.get("execution"):
         lines.append(

@@ -10,7 +10,7 @@ from planners.maze.placement import check_placement
 from planners.maze.places import RobotSize
 from planners.motion.store import load_motion
 from planners.search.problem import Problem
-from srs_opt.command import progress, say
+from srs_opt.command import chosen_model, progress, say
 from srs_opt.drive.calibration import load_calibration
 from srs_opt.errors import InputError
 from srs_opt.gait_opt.table import GaitTable, load_table
@@ -74,4 +74,4 @@ def gaits_from(options: argparse.Namespace, robot: Robot) -> GaitTable:
 
     if unsteady := room_effects(robot):
         say(options, f"note: planned without {', '.join(unsteady)}: what depends on the room has no gait")
-    return default_table(robot, options.model, say=lambda text: say(options, text))
+    return default_table(robot, chosen_model(options, robot), say=lambda text: say(options, text))

@@ -56,3 +56,8 @@ class StateLayout:
         """Entries that obey the equations of motion and that a gait repeats: velocity, and bends if free."""
         bends = [*range(self.kappa.start, self.dkappa.stop)] if self.compliant else []
         return [*range(VELOCITY.start, VELOCITY.stop), *bends]
+
+    @property
+    def periodic(self) -> list[int]:
+        """Entries that a steady gait repeats: all but pose and work."""
+        return [*range(VELOCITY.start, VELOCITY.stop), *range(BODY_STATES, self.size)]
