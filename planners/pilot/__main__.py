@@ -53,8 +53,8 @@ def run(options: argparse.Namespace) -> Answer:
     """Plan, connect, drive, write."""
     from planners.pilot.hardware import MachineClock, open_port
     from planners.pilot.page import LivePage
-    from planners.pilot.pose import open_source
     from planners.pilot.session import pilot
+    from planners.pilot.sources import open_source
     from planners.plan.inputs import problem_from
     from planners.plan.portfolio import Wish, solve
     from srs_opt.controller.program import Program

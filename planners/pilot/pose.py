@@ -9,16 +9,13 @@ from __future__ import annotations
 import json
 import math
 from collections import deque
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from planners.pilot.valve_line import Clock
 from srs_opt.errors import InputError
-from srs_opt.robot import Robot
 
 Array = NDArray[np.float64]
 REMEMBERED_STAMPS = 3000  # half a minute at 100 Hz: long against jitter, short against the drift of clocks
@@ -153,29 +150,3 @@ class Camera:
             return report.arrived_s
         self._offsets.append(report.arrived_s - report.stamp_s)
         return report.stamp_s + min(self._offsets)
-
-
-def open_source(spec: str, robot: Robot, clock: Clock, complain: Callable[[str], None]) -> PoseSource:
-    """Return the source that `spec` names.
-
-    ``udp://HOST:PORT``: JSON lines in UDP packets. ``natnet://GROUP:PORT``: rigid bodies 1 (tail) to N (head)
-    of a NatNet multicast. ``ros2://TOPIC``: geometry_msgs/PoseStamped of the robot's pose.
-
-    Raises
-    ------
-    InputError
-        For another `spec`, an address that cannot be had, or a missing package.
-    """
-    from planners.pilot.sources import NatNetPoses, Ros2Poses, UdpPoses
-
-    scheme, _, rest = spec.partition("://")
-    if scheme == "ros2" and rest:
-        return Ros2Poses("/" + rest.lstrip("/"), clock)
-    host, _, port = rest.rpartition(":")
-    if scheme not in ("udp", "natnet") or not host or not port.isdigit() or not 0 < int(port) < 65536:
-        raise InputError(
-            f"--pose: expected udp://HOST:PORT, natnet://GROUP:PORT or ros2://TOPIC, found '{spec}'"
-        )
-    if scheme == "udp":
-        return UdpPoses(host, int(port), robot.links, clock, complain)
-    return NatNetPoses(host, int(port), robot.links, clock, complain)

@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from planners.pilot.pose import Report, parse_report
+from planners.pilot.pose import PoseSource, Report, parse_report
 from planners.pilot.valve_line import Clock
 from srs_opt.errors import InputError
+from srs_opt.robot import Robot
 
 MOST_COMPLAINTS = 3  # about malformed input; more only repeat themselves
 FRAME_OF_DATA = 7  # NatNet's message identifier
@@ -195,3 +196,27 @@ class Ros2Poses:
     def close(self) -> None:
         """Destroy the node."""
         self._node.destroy_node()
+
+
+def open_source(spec: str, robot: Robot, clock: Clock, complain: Callable[[str], None]) -> PoseSource:
+    """Return the source that `spec` names.
+
+    ``udp://HOST:PORT``: JSON lines in UDP packets. ``natnet://GROUP:PORT``: rigid bodies 1 (tail) to N (head)
+    of a NatNet multicast. ``ros2://TOPIC``: geometry_msgs/PoseStamped of the robot's pose.
+
+    Raises
+    ------
+    InputError
+        For another `spec`, an address that cannot be had, or a missing package.
+    """
+    scheme, _, rest = spec.partition("://")
+    if scheme == "ros2" and rest:
+        return Ros2Poses("/" + rest.lstrip("/"), clock)
+    host, _, port = rest.rpartition(":")
+    if scheme not in ("udp", "natnet") or not host or not port.isdigit() or not 0 < int(port) < 65536:
+        raise InputError(
+            f"--pose: expected udp://HOST:PORT, natnet://GROUP:PORT or ros2://TOPIC, found '{spec}'"
+        )
+    if scheme == "udp":
+        return UdpPoses(host, int(port), robot.links, clock, complain)
+    return NatNetPoses(host, int(port), robot.links, clock, complain)
