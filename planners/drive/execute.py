@@ -18,7 +18,7 @@ from planners.drive.track import Choice, Learned, Where, by_plan, choose, neares
 from planners.plan.answer import Plan
 from planners.plan.solve import solve_with_lattice
 from planners.search.problem import ROUNDING_M, Problem
-from planners.search.tree import Root
+from planners.search.tree import Root, arrival_index
 from srs_opt.errors import InputError, NoAnswerError
 from srs_opt.model.parameters import valve_delay_s
 from srs_opt.robot import Robot
@@ -140,11 +140,16 @@ class Drive:
 
     def _advance(self) -> Execution | None:
         """Play one cycle, or halt and look for another way; return the end of the drive if this was it."""
+        at_rest = self.before == self.problem.motion.rest
+        if at_rest and self.played and self._at_goal():
+            return self._done("arrived")  # it rolled out into the goal
         gait = self._next_gait()
         if gait is None:
             reason = "no gait keeps the body off the walls and no other way was found"
             if self.halts == MOST_HALTS or not self._halt():
                 return self._stop(reason)
+            if self._at_goal():
+                return None
             self.tell(f"cycle {len(self.played)}: halted, looking for a way from rest")
             return None if self._plan_anew() else self._stop(reason)
         outcome = self._cycle(gait)
@@ -157,7 +162,12 @@ class Drive:
         self.state, self.before = self.plant.state, self.problem.motion.rest
         self.halts += 1
         self.tell(f"cycle {len(self.played)}: {stopped.reason}")
-        return stopped.may_go_on and self.halts <= MOST_HALTS and self._plan_anew()
+        if not stopped.may_go_on or self.halts > MOST_HALTS:
+            return False
+        return self._at_goal() or self._plan_anew()
+
+    def _at_goal(self) -> bool:
+        return arrival_index(self.problem.goal, self.state[None, :3]) is not None
 
     def _next_gait(self) -> int | None:
         choice = self._choice()
