@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from planners.drive.contact import BodyWatch
 from planners.drive.foresight import Foresight
 from planners.drive.halt import halt
-from planners.drive.plant import Plant, SimulatedPlant
+from planners.drive.plant import Plant, PlantStopped, SimulatedPlant
 from planners.drive.track import Choice, Learned, Where, by_plan, choose, nearest_node, reference_of
 from planners.plan.answer import Plan
 from planners.plan.solve import solve_with_lattice
 from planners.search.problem import ROUNDING_M, Problem
-from planners.search.tree import Root
+from planners.search.tree import Root, arrival_index
 from srs_opt.errors import InputError, NoAnswerError
 from srs_opt.model.parameters import valve_delay_s
 from srs_opt.robot import Robot
@@ -130,16 +130,44 @@ class Drive:
         """Drive until something ends it."""
         self.watch.look(np.zeros(1), self.state[None, :3], np.zeros((1, self.problem.robot.segments)))
         while len(self.played) < self.most_cycles:
-            gait = self._next_gait()
-            if gait is None:
-                reason = "no gait keeps the body off the walls and no other way was found"
-                if self.halts == MOST_HALTS or not self._halt() or not self._plan_anew():
-                    return self._stop(reason)
-                continue
-            outcome = self._cycle(gait)
-            if outcome is not None:
-                return self._done(outcome)
+            try:
+                ended = self._advance()
+            except PlantStopped as stopped:
+                ended = None if self._go_on_after(stopped) else self._done(stopped.reason)
+            if ended is not None:
+                return ended
         return self._stop(f"the goal was not reached within {self.most_cycles} cycles")
+
+    def _advance(self) -> Execution | None:
+        """Play one cycle, or halt and look for another way; return the end of the drive if this was it."""
+        at_rest = self.before == self.problem.motion.rest
+        if at_rest and self.played and self._at_goal():
+            return self._done("arrived")  # it rolled out into the goal
+        gait = self._next_gait()
+        if gait is None:
+            reason = "no gait keeps the body off the walls and no other way was found"
+            if self.halts == MOST_HALTS or not self._halt():
+                return self._stop(reason)
+            if self._at_goal():
+                return None
+            self.tell(f"cycle {len(self.played)}: halted, looking for a way from rest")
+            return None if self._plan_anew() else self._stop(reason)
+        outcome = self._cycle(gait)
+        if outcome == "arrived" and not self.plant.waits:
+            self._halt()
+        return None if outcome is None else self._done(outcome)
+
+    def _go_on_after(self, stopped: PlantStopped) -> bool:
+        """Look for another way from where the robot was stopped, if there may be one."""
+        self.state, self.before = self.plant.state, self.problem.motion.rest
+        self.halts += 1
+        self.tell(f"cycle {len(self.played)}: {stopped.reason}")
+        if not stopped.may_go_on or self.halts > MOST_HALTS:
+            return False
+        return self._at_goal() or self._plan_anew()
+
+    def _at_goal(self) -> bool:
+        return arrival_index(self.problem.goal, self.state[None, :3]) is not None
 
     def _next_gait(self) -> int | None:
         choice = self._choice()
@@ -148,6 +176,8 @@ class Drive:
             self.replans += 1
             why = "strayed or stuck" if lost else "nothing fits"
             self.tell(f"cycle {len(self.played)}: {why}, planning anew")
+            if not self.plant.waits and self.before != self.problem.motion.rest:
+                return None  # it cannot be planned in motion: halt first
             if self._plan_anew():
                 choice = self._choice()
         if choice.clearance_m < STOP_CLEARANCE_M:
@@ -247,12 +277,15 @@ class Drive:
     def _halt(self) -> bool:
         """Bring the robot to rest where there is room for it; return whether it came to no harm."""
         self.halts += 1
-        trajectory = self.plant.play(halt(self.foresight, self.state), None)
-        self.watch.look(trajectory.time_s, trajectory.pose, trajectory.kappa, ends=False)
+        try:
+            trajectory = self.plant.play(halt(self.foresight, self.state), None)
+        except PlantStopped as stopped:  # it vented by itself
+            if not stopped.may_go_on:
+                raise
+        else:
+            self.watch.look(trajectory.time_s, trajectory.pose, trajectory.kappa, ends=False)
         self.state = self.plant.state
         self.before = self.problem.motion.rest
-        if not self.watch.touched:
-            self.tell(f"cycle {len(self.played)}: halted, looking for a way from rest")
         return not self.watch.touched
 
     def _done(self, outcome: str) -> Execution:

@@ -16,11 +16,29 @@ from srs_opt.simulate.timeline import Timeline
 Array = NDArray[np.float64]
 
 
+class PlantStopped(Exception):
+    """The robot has been vented and stands still.
+
+    Attributes
+    ----------
+    reason : str
+        In words.
+    may_go_on : bool
+        Whether another way may be tried from where it stands.
+    """
+
+    def __init__(self, reason: str, may_go_on: bool) -> None:
+        super().__init__(reason)
+        self.reason, self.may_go_on = reason, may_go_on
+
+
 class Plant(Protocol):
     """What is driven.
 
     Attributes
     ----------
+    waits : bool
+        Whether time stands still between two motions, as in a simulation.
     robot : Robot
         For its body's width and valve delay.
     run : Integrator
@@ -29,6 +47,7 @@ class Plant(Protocol):
         Now, or where the last motion will have ended, as the planned robot's model has it.
     """
 
+    waits: bool
     robot: Robot
     run: Integrator
     state: Array
@@ -42,6 +61,8 @@ class SimulatedPlant:
 
     Commands reach its valves late by a constant; that delay is waited once, before the first cycle.
     """
+
+    waits = True
 
     def __init__(self, problem: Problem, robot: Robot) -> None:
         self.robot = robot

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import lru_cache
 
 import numpy as np
@@ -77,6 +77,15 @@ class Trajectory:
             pose = PchipInterpolator(self.time_s, self.pose, axis=0)(time_s)
             kappa = PchipInterpolator(self.time_s, self.kappa, axis=0)(time_s)
         return pose, kappa
+
+    def then(self, later: Trajectory) -> Trajectory:
+        """Return this motion and the one that goes on from its final state as one."""
+        joined = {
+            f.name: np.concatenate([getattr(self, f.name), getattr(later, f.name)[1:]]) for f in fields(self)
+        }
+        joined["time_s"][self.time_s.size :] += self.time_s[-1]
+        joined |= {"final": later.final, "error_m_s": np.concatenate([self.error_m_s, later.error_m_s])}
+        return Trajectory(**joined)
 
 
 class Integrator:
