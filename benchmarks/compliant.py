@@ -11,7 +11,6 @@ from srs_opt.robot import Robot, wpi_srs
 from srs_opt.simulate.integrate import Integrator
 from srs_opt.simulate.timeline import Timeline
 
-
 STIFFNESSES = (None, 0.02, 0.01, 0.005, 0.003, 0.002)
 # (offset, stiffness) -> speed m/s or radius m, of an independent program, from rest
 KNOWN_SPEED = {None: 0.231, 0.02: 0.233, 0.01: 0.272, 0.005: 0.246, 0.003: 0.224, 0.002: 0.239}
