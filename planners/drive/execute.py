@@ -214,8 +214,8 @@ class Drive:
 
     def _room_m(self, state: Array, gait: int) -> float:
         """Return the least clearance over a cycle with any friction that the robot may have."""
-        played = self.problem.gaits.gaits[gait].gait
-        return self.foresight.least_room_m(state, Timeline.of_gait(played, played.period_s), 0.0)
+        timeline = self.problem.joints.timeline(self.before, gait)
+        return self.foresight.least_room_m(state, timeline, 0.0)
 
     def _gait_by_plan(self, state: Array) -> int | None:
         """Return the gait that the plan plays next, if the robot is as the plan has it after a cycle."""
@@ -249,7 +249,7 @@ class Drive:
         """Play one cycle; return what ended the drive, if anything."""
         gait = self.problem.gaits.gaits[index].gait
         begin, before = self.state[:3].copy(), self.state
-        cycle = Timeline.of_gait(gait, gait.period_s)
+        cycle = self.problem.joints.timeline(self.before, index)
         trajectory = self.plant.play(cycle, index)
         arrived = self.watch.look(trajectory.time_s, trajectory.pose, trajectory.kappa)
         self.state = self.plant.state
@@ -278,7 +278,7 @@ class Drive:
         """Bring the robot to rest where there is room for it; return whether it came to no harm."""
         self.halts += 1
         try:
-            trajectory = self.plant.play(halt(self.foresight, self.state), None)
+            trajectory = self.plant.play(halt(self.foresight, self.state, self.before), None)
         except PlantStopped as stopped:  # it vented by itself
             if not stopped.may_go_on:
                 raise
