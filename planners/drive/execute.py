@@ -22,7 +22,6 @@ from planners.search.tree import Root, arrival_index
 from srs_opt.errors import InputError, NoAnswerError
 from srs_opt.model.parameters import valve_delay_s
 from srs_opt.robot import Robot
-from srs_opt.simulate.timeline import Timeline
 
 Array = NDArray[np.float64]
 ASTRAY_M = 0.06  # farther from the plan than this: plan anew
@@ -250,7 +249,8 @@ class Drive:
         gait = self.problem.gaits.gaits[index].gait
         begin, before = self.state[:3].copy(), self.state
         cycle = self.problem.joints.timeline(self.before, index)
-        trajectory = self.plant.play(cycle, index)
+        plain = self.problem.joints.is_plain(self.before, index)
+        trajectory = self.plant.play(cycle, index if plain else None)
         arrived = self.watch.look(trajectory.time_s, trajectory.pose, trajectory.kappa)
         self.state = self.plant.state
         self.played.append(index)

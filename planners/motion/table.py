@@ -103,7 +103,7 @@ class MotionTable:
 
     @cached_property
     def allowed(self) -> NDArray[np.bool_]:
-        """Whether the valves can play a gait after another (n + 1, n); a cycle that is played moves the body."""
+        """Whether a gait can follow another (n + 1, n): a cycle that is simulated moves the body."""
         return np.asarray(self.pose[:, :, 0].any(axis=(2, 3)))
 
     @cached_property

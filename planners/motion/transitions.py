@@ -20,10 +20,10 @@ from planners.motion.valves import DEFAULT_LIMITS, Joints, ValveLimits
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait_opt.table import GaitTable, TableGait
 from srs_opt.orbit.actuators import periodic_actuators
-from srs_opt.orbit.steady import integrator
+from srs_opt.orbit.steady import integrator, steady_gait
 from srs_opt.robot import Robot
 from srs_opt.simulate.integrate import Integrator
-from srs_opt.simulate.rosenbrock import BODY_STATES, VELOCITY
+from srs_opt.simulate.rosenbrock import VELOCITY
 from srs_opt.simulate.shapes import centre_lines
 from srs_opt.simulate.together import Search, together
 
@@ -94,7 +94,7 @@ def simulate_transitions(
         for now in following:
             for level, (last, samples) in enumerate(islice(outcomes, len(starts))):
                 pose[before, now, level] = samples[:, :3]
-                kappa[before, now] = samples[:, BODY_STATES : BODY_STATES + robot.segments]
+                kappa[before, now] = samples[:, run.layout.kappa]
                 after[before, now, level] = last[VELOCITY][0]
     # from rest there is one speed only: equal levels, spaced so that they can be looked up
     speed[n] = np.linspace(-1e-3, 1e-3, LEVELS)
@@ -126,9 +126,13 @@ def _speed_levels(table: GaitTable) -> np.ndarray:
 
 def _ends(run: Integrator, entry: TableGait, cycle: CycleRun, speeds: np.ndarray) -> list[np.ndarray]:
     """Return the states in which one cycle of a gait ends when begun at different forward speeds."""
-    start = run.rest()
-    gait = entry.gait
-    start[BODY_STATES:] = periodic_actuators(run, gait, run.pack(gait.pressure_kpa, gait.frequency_hz))
+    if run.structure.compliant:  # one cycle does not settle the bends: begin with those of the steady gait
+        start = steady_gait(run.robot, entry.gait, run.structure.model).solution.start
+    else:
+        start = run.rest()
+        gait = entry.gait
+        p = run.pack(gait.pressure_kpa, gait.frequency_hz)
+        start[run.layout.actuator] = periodic_actuators(run, gait, p)
     begun = []
     for speed in speeds:
         state = start.copy()

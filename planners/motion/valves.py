@@ -133,13 +133,13 @@ class Joints:
         return self.joint(before, now) is self._plain[now]
 
     def vent(self, before: int, duration_s: float) -> Timeline:
-        """Return the valves of venting after a cycle: each holds until it has dwelt, then both are open."""
+        """Return the valves of venting after a cycle: each segment's hold until they have dwelt."""
         if before == self.rest:
-            raise ValueError("vented already")
+            return Timeline.vent(self._gaits[0].segments, duration_s, 0.0)
         gait = self._gaits[before]
         state, age = _end(gait)
         wait = np.array([max(0.0, self._later(self.limits.dwell_s - a)) for a in age])
-        edges = np.unique([0.0, *wait, duration_s])
+        edges = np.unique([0.0, *wait, wait.max() + duration_s])
         middles = (edges[:-1] + edges[1:]) / 2
         valve = np.where(middles < wait[:, None], np.array(state)[:, None], 0.0)
         return Timeline.constant(np.diff(edges), valve, gait.pressure_kpa, gait.frequency_hz)

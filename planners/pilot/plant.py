@@ -146,7 +146,7 @@ class PilotedPlant:
         if gait is None:
             tick_s = self._program.tick_s
             events, period = events_of(timeline, tick_s)
-            pressure_pa = round(1e3 * float(timeline.pressure_kpa[0]))
+            pressure_pa = round(1e3 * float(timeline.pressure_kpa[-1]))  # a ramp ends there
             self._line.cycle(None, period, pressure_pa, events, self._program.words)
         else:
             self._line.select(gait, None)

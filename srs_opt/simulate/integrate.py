@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 
@@ -171,7 +172,7 @@ class Integrator:
             return _pieces(timeline)
         whole = replace(timeline, pressure_kpa=np.zeros(timeline.duration_s.size))
         cut = np.cumsum([0, *(piece.duration_s.size for piece in _pieces(whole))])
-        return [timeline.part(slice(a, b)).at_one_pressure() for a, b in zip(cut, cut[1:])]
+        return [timeline.part(slice(a, b)).at_one_pressure() for a, b in pairwise(cut)]
 
     def _alike(
         self, x: np.ndarray, mesh: Mesh, valve: np.ndarray, p: np.ndarray, many: int, tolerance: float

@@ -81,9 +81,8 @@ class Timeline:
         most = float(self.pressure_kpa.max())
         if (self.pressure_kpa == most).all():
             return self
-        return replace(
-            self, valve=self.valve * self.pressure_kpa / most, pressure_kpa=np.full(self.duration_s.size, most)
-        )
+        pressure = np.full(self.duration_s.size, most)
+        return replace(self, valve=self.valve * self.pressure_kpa / most, pressure_kpa=pressure)
 
     def until(self, end_s: float) -> Timeline:
         """Return the timeline cut off at `end_s`."""
