@@ -66,15 +66,23 @@ class SimulatedPlant:
 
     def __init__(self, problem: Problem, robot: Robot) -> None:
         self.robot = robot
-        self.run = Integrator(undelayed(robot), problem.gaits.model)
+        self.run = Integrator(undelayed(robot), _model(problem, robot))
         start = problem.start
         self._problem = problem
         self._state = self.run.rest(start.x, start.y, start.heading)
-        self.state = problem.as_planned(self._state)
+        self.state = problem.as_planned(self._state, self.run)
 
     def play(self, timeline: Timeline, gait: int | None) -> Trajectory:
         """Integrate the model over the timeline."""
         trajectory = self.run.run(timeline, self._state)
         self._state = trajectory.final
-        self.state = self._problem.as_planned(self._state)
+        self.state = self._problem.as_planned(self._state, self.run)
         return trajectory
+
+
+def _model(problem: Problem, robot: Robot) -> str:
+    """Return the model that drives: the plan's, but a robot that is softer or stiffer has its own."""
+    planned = problem.gaits.model
+    if robot.is_soft == problem.robot.is_soft and not (planned == "compliant" and not robot.is_soft):
+        return planned
+    return robot.own_model

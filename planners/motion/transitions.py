@@ -18,11 +18,11 @@ from planners.motion.table import SAMPLES, MotionTable
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait_opt.table import GaitTable, TableGait
 from srs_opt.orbit.actuators import periodic_actuators
-from srs_opt.orbit.steady import integrator
+from srs_opt.orbit.steady import integrator, steady_gait
 from srs_opt.robot import Robot
 from srs_opt.simulate.integrate import Integrator
 from srs_opt.simulate.mesh import Mesh
-from srs_opt.simulate.rosenbrock import BODY_STATES, VELOCITY
+from srs_opt.simulate.rosenbrock import VELOCITY
 from srs_opt.simulate.shapes import centre_lines
 from srs_opt.simulate.together import Search, together
 
@@ -69,8 +69,8 @@ class _Cycle:
         x[:3] = 0.0
         states, _ = yield from self.run.stepping(x, self.mesh, self.valve, self.p)
         all_states = np.concatenate([x[:, None], states], axis=1)
-        n = self.run.structure.segments
-        wanted = [0, 1, 2, *range(BODY_STATES, BODY_STATES + n)]
+        kappa = self.run.layout.kappa
+        wanted = [0, 1, 2, *range(kappa.start, kappa.stop)]
         sampled = np.stack([np.interp(self.at, self.time, all_states[i]) for i in wanted], axis=1)
         return states[:, -1], sampled[:, :3], sampled[:, 3:]
 
@@ -132,8 +132,11 @@ def _speed_levels(table: GaitTable) -> np.ndarray:
 
 def _ends(run: Integrator, entry: TableGait, cycle: _Cycle, speeds: np.ndarray) -> list[np.ndarray]:
     """Return the states in which one cycle of a gait ends when begun at different forward speeds."""
-    start = run.rest()
-    start[BODY_STATES:] = periodic_actuators(run, entry.gait, cycle.p)
+    if run.structure.compliant:  # one cycle does not settle the bends: begin with those of the steady gait
+        start = steady_gait(run.robot, entry.gait, run.structure.model).solution.start
+    else:
+        start = run.rest()
+        start[run.layout.actuator] = periodic_actuators(run, entry.gait, cycle.p)
     begun = []
     for speed in speeds:
         state = start.copy()

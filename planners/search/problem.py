@@ -24,7 +24,6 @@ from srs_opt.orbit.steady import integrator
 from srs_opt.robot import Robot
 from srs_opt.simulate.integrate import Integrator
 from srs_opt.simulate.mesh import Mesh
-from srs_opt.simulate.rosenbrock import BODY_STATES
 from srs_opt.simulate.shapes import centre_lines
 from srs_opt.simulate.together import together
 
@@ -153,12 +152,12 @@ class Problem:
             cycles.append(_Plan(mesh, valve, p, low, (at - time[low]) / mesh.h_s[low]))
         return cycles
 
-    def as_planned(self, state: Array) -> Array:
-        """Return another robot's state as the planned robot's model has it: place, speed and curvature."""
-        planned, known = self.run.rest(), BODY_STATES + 2 * self.robot.segments
-        planned[:6] = state[:6]
-        planned[BODY_STATES:known] = state[BODY_STATES:known]
-        return planned
+    def as_planned(self, state: Array, run: Integrator | None = None) -> Array:
+        """Return another robot's state as the planned robot's model has it: place, speed and curvature.
+
+        `run` is that robot's model; by default one of the planned robot's kind.
+        """
+        return self.run.layout.adopt(state, (run or self.run).layout)
 
     def simulate(self, state: Array, gait: int) -> Cycle:
         """Return one cycle of a gait from a state of the dynamic model."""
@@ -190,7 +189,7 @@ class Problem:
         if not went:
             return []
         samples = np.stack([_sampled(state, plan, states) for state, plan, states in went])
-        curved = samples[..., BODY_STATES : BODY_STATES + self.robot.segments]
+        curved = samples[..., self.run.layout.kappa]
         lines = centre_lines(self.run, curved.reshape(-1, curved.shape[-1]))
         pose = samples[..., :3]
         placed = body_in_room(lines.reshape(*curved.shape[:-1], *lines.shape[1:]), pose)

@@ -18,7 +18,8 @@ from srs_opt.simulate.rosenbrock import step_function
 from srs_opt.simulate.timeline import Timeline
 from srs_opt.simulate.together import Search, Stretch, alone
 
-_REFINEMENTS = 3
+_REFINEMENTS = 3  # of a mesh, coarser here and finer there; after them it only gets finer
+_ATTEMPTS = 12
 STEP_S = 0.005  # first guess of the step
 LOOSE = 8.0  # a mesh is kept while no step errs by more than this many tolerances
 MANY = 32  # alike pieces integrated in one call
@@ -167,7 +168,7 @@ class Integrator:
 
         Returns states (nx, n), errors (n,), the mesh of each piece and how many pieces were done.
         """
-        for _ in range(_REFINEMENTS):
+        for attempt in range(_ATTEMPTS):
             repeated = mesh.repeated(many, valve.shape[1])
             states, errors = yield from self.stepping(x, repeated, np.tile(valve, many), p)
             worst = errors.reshape(many, -1).max(axis=1)
@@ -175,7 +176,9 @@ class Integrator:
             if good:
                 kept = good * mesh.h_s.size
                 return states[:, :kept], errors[:kept], mesh, good
-            mesh, many = mesh.refined(errors[: mesh.h_s.size], tolerance), 1
+            # stretches at rest look easy until their steps are longer than what happens at their end
+            least = tolerance if attempt >= _REFINEMENTS else 0.0
+            mesh, many = mesh.refined(np.maximum(errors[: mesh.h_s.size], least), tolerance), 1
         states, errors = yield from self.stepping(x, mesh, valve, p)
         return states, errors, mesh, 1
 
