@@ -1,7 +1,7 @@
 """Step responses of a segment, lifted and on the ground (the paper's Fig. 6), from one robot file.
 
-Our copy of the paper holds no measured value, so the compliant model generates the readings, with noise. Lifted,
-a segment follows its no-load curvature; on the ground the wheels' friction bends it back.
+Our copy of the paper holds no measured value: the compliant model generates the readings, with noise.
+Lifted, a segment follows its no-load curvature; on the ground the wheels' friction bends it back.
 """
 
 from pathlib import Path
