@@ -28,7 +28,7 @@ FRICTIONS = ((1.0, 1.0), (0.8, 0.8), (1.2, 1.2), (0.8, 1.0), (1.25, 1.0), (1.5, 
 # bending stiffness over the planned one of a soft robot whose file gives no deviation; N m^2 for a rigid plan
 # (a silicone segment of the built-in robot's size has 0.002 to 0.02)
 STIFFNESS_TIMES = (0.5, 2.0)
-STIFFNESSES_N_M2 = (0.004, 0.012)
+STIFFNESSES_N_M2 = (0.0025, 0.005, 0.012)
 # a body that yields though the plan says rigid is suspected only when no friction explains what was seen: it
 # begins with this squared miss. With 0 sound robots are driven as carefully as soft ones
 UNLIKELY = 1.5
