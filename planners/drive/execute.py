@@ -32,7 +32,9 @@ MOST_TRIED = 8  # gaits, before a cycle is given up
 MOST_IDLE = 4  # cycles without progress along the plan
 MOST_REPLANS = 8
 MOST_HALTS = 3  # from which the robot sets off again
-REPLAN_CYCLES = 4000  # looked at when planning anew
+REPLAN_CYCLES = 4000  # looked at when planning anew in motion
+REST_CYCLES = 40_000  # and from rest, where there is time
+REPLAN_S, REST_S = 20.0, 60.0
 PATIENCE = 3.0  # times the plan's cycles
 
 
@@ -228,14 +230,15 @@ class Drive:
     def _plan_anew(self) -> bool:
         """Look for a way from here; the model takes over place, speed and curvature."""
         # half the margin is asked for on the way, and where the robot is now, no more than it has
+        at_rest = self.before == self.problem.motion.rest
         relaxed = replace(self.problem, margin_m=self.problem.margin_m / 2)
         slack = min(0.0, self.watch.now_m - relaxed.margin_m) - ROUNDING_M
         try:
             result = solve_with_lattice(
                 relaxed,
                 root=Root(self.state, self.before, slack),
-                time_limit_s=20.0,
-                max_nodes=REPLAN_CYCLES,
+                time_limit_s=REST_S if at_rest else REPLAN_S,
+                max_nodes=REST_CYCLES if at_rest else REPLAN_CYCLES,
             )
         except NoAnswerError:
             return False

@@ -62,6 +62,14 @@ def test_soft_robots_under_a_rigid_plan_seldom_touch(problem_in):
     assert sum(driven.reached for driven in drives) >= 7
 
 
+@pytest.mark.parametrize("stiffness", [None, 0.02, 0.002])
+def test_other_robots_under_a_soft_plan_never_touch(soft_problem, stiffness):
+    other = wpi_srs() if stiffness is None else soft(stiffness)
+    driven = execute(soft_problem, solve_with_lattice(soft_problem).plan, other)
+    assert driven.collisions == 0
+    assert driven.reached or driven.reason.startswith("stopped")
+
+
 def test_states_are_carried_between_models(soft_problem, problem_in):
     run, rigid = soft_problem.run, problem_in(corridor(0.3, 2.0))
     gait = soft_problem.gaits.gaits[0].gait
