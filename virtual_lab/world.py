@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from virtual_lab.live import LiveRobot
 from virtual_lab.truth import Truth
 
 LONGEST_HOLD_S = 0.01  # the robot is moved on at least so often
+STAIR_S = 0.005  # of a changing pressure
 
 
 @dataclass(frozen=True)
@@ -34,6 +36,8 @@ class Imperfections:
         Pictures per second.
     clock_s : float
         The camera's clock when the world's is 0.
+    settle_s : float
+        The regulator goes from one pressure to the next linearly, in this time.
     """
 
     noise_m: float = 0.001
@@ -42,6 +46,7 @@ class Imperfections:
     line_s: float = 0.004
     rate_hz: float = 100.0
     clock_s: float = 12345.678
+    settle_s: float = 0.1
 
 
 DEFAULT = Imperfections()
@@ -97,6 +102,7 @@ class World:
         self._there, self._back = _Queue(imperfections.line_s), _Queue(imperfections.line_s)
         self._camera = _Queue(imperfections.latency_s)
         self._valves, self._pressure_kpa = np.zeros(truth.parameters.links - 1), 0.0
+        self._ramp = (-math.inf, 0.0, 0.0)  # since when the regulator goes from which pressure to which
         self._held_s = 0.0
         self.track: list[tuple[float, np.ndarray, np.ndarray, np.ndarray]] = []
         self.blind = False
@@ -126,7 +132,8 @@ class World:
     def _tick(self) -> None:
         for data in self._there.due(self._time_s):
             self.controller.receive(data)
-        valves, pressure_kpa = self.controller.tick()
+        valves, set_kpa = self.controller.tick()
+        pressure_kpa = self._regulated(set_kpa)
         self._back.put(self._time_s, self.controller.send())
         if pressure_kpa != self._pressure_kpa or not np.array_equal(valves, self._valves):
             self._move()
@@ -138,6 +145,15 @@ class World:
         if self._time_s >= self._next_picture_s - 1e-9:
             self._next_picture_s += 1 / self._i.rate_hz
             self._picture()
+
+    def _regulated(self, set_kpa: float) -> float:
+        """Return the regulator's pressure, in stairs of STAIR_S."""
+        began_s, from_kpa, to_kpa = self._ramp
+        if set_kpa != to_kpa:
+            began_s, from_kpa, to_kpa = self._ramp = self._time_s, self._pressure_kpa, set_kpa
+        stairs = math.floor((self._time_s - began_s) / STAIR_S + 1e-6) if math.isfinite(began_s) else math.inf
+        share = (stairs + 0.5) * STAIR_S / self._i.settle_s if self._i.settle_s else 1.0
+        return to_kpa if share >= 1 else from_kpa + share * (to_kpa - from_kpa)
 
     def _move(self) -> None:
         if self._held_s > 0:

@@ -22,7 +22,6 @@ from planners.search.tree import Root, arrival_index
 from srs_opt.errors import InputError, NoAnswerError
 from srs_opt.model.parameters import valve_delay_s
 from srs_opt.robot import Robot
-from srs_opt.simulate.timeline import Timeline
 
 Array = NDArray[np.float64]
 ASTRAY_M = 0.06  # farther from the plan than this: plan anew
@@ -33,7 +32,9 @@ MOST_TRIED = 8  # gaits, before a cycle is given up
 MOST_IDLE = 4  # cycles without progress along the plan
 MOST_REPLANS = 8
 MOST_HALTS = 3  # from which the robot sets off again
-REPLAN_CYCLES = 4000  # looked at when planning anew
+REPLAN_CYCLES = 4000  # looked at when planning anew in motion
+REST_CYCLES = 40_000  # and from rest, where there is time
+REPLAN_S, REST_S = 20.0, 60.0
 PATIENCE = 3.0  # times the plan's cycles
 
 
@@ -214,8 +215,8 @@ class Drive:
 
     def _room_m(self, state: Array, gait: int) -> float:
         """Return the least clearance over a cycle with any friction that the robot may have."""
-        played = self.problem.gaits.gaits[gait].gait
-        return self.foresight.least_room_m(state, Timeline.of_gait(played, played.period_s), 0.0)
+        timeline = self.problem.joints.timeline(self.before, gait)
+        return self.foresight.least_room_m(state, timeline, 0.0)
 
     def _gait_by_plan(self, state: Array) -> int | None:
         """Return the gait that the plan plays next, if the robot is as the plan has it after a cycle."""
@@ -229,14 +230,15 @@ class Drive:
     def _plan_anew(self) -> bool:
         """Look for a way from here; the model takes over place, speed and curvature."""
         # half the margin is asked for on the way, and where the robot is now, no more than it has
+        at_rest = self.before == self.problem.motion.rest
         relaxed = replace(self.problem, margin_m=self.problem.margin_m / 2)
         slack = min(0.0, self.watch.now_m - relaxed.margin_m) - ROUNDING_M
         try:
             result = solve_with_lattice(
                 relaxed,
                 root=Root(self.state, self.before, slack),
-                time_limit_s=20.0,
-                max_nodes=REPLAN_CYCLES,
+                time_limit_s=REST_S if at_rest else REPLAN_S,
+                max_nodes=REST_CYCLES if at_rest else REPLAN_CYCLES,
             )
         except NoAnswerError:
             return False
@@ -249,8 +251,9 @@ class Drive:
         """Play one cycle; return what ended the drive, if anything."""
         gait = self.problem.gaits.gaits[index].gait
         begin, before = self.state[:3].copy(), self.state
-        cycle = Timeline.of_gait(gait, gait.period_s)
-        trajectory = self.plant.play(cycle, index)
+        cycle = self.problem.joints.timeline(self.before, index)
+        plain = self.problem.joints.is_plain(self.before, index)
+        trajectory = self.plant.play(cycle, index if plain else None)
         arrived = self.watch.look(trajectory.time_s, trajectory.pose, trajectory.kappa)
         self.state = self.plant.state
         self.played.append(index)
@@ -278,7 +281,7 @@ class Drive:
         """Bring the robot to rest where there is room for it; return whether it came to no harm."""
         self.halts += 1
         try:
-            trajectory = self.plant.play(halt(self.foresight, self.state), None)
+            trajectory = self.plant.play(halt(self.foresight, self.state, self.before), None)
         except PlantStopped as stopped:  # it vented by itself
             if not stopped.may_go_on:
                 raise

@@ -53,7 +53,7 @@ class Plant(Protocol):
     state: Array
 
     def play(self, timeline: Timeline, gait: int | None) -> Trajectory:
-        """Play valves from now on; return the motion. `gait` is the table entry, if it is one whole cycle."""
+        """Play valves from now on; return the motion. `gait`: the table's, if it is its own cycle."""
 
 
 class SimulatedPlant:

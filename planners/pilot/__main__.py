@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from planners.plan.__main__ import add_planning_options
-from srs_opt.command import Answer, Parser, make_parser, positive_float, positive_int, run_command, say
+from srs_opt.command import Answer, Parser, make_parser, positive_int, run_command, say
 
 if TYPE_CHECKING:
     from planners.pilot.session import PilotedDrive
@@ -36,9 +36,6 @@ def build_parser() -> Parser:
         required=True,
         metavar="SOURCE",
         help="udp://HOST:PORT (JSON lines), natnet://GROUP:PORT (rigid bodies 1 to N), ros2://TOPIC",
-    )
-    parser.add_argument(
-        "--tick", type=positive_float, default=1e-3, metavar="S", help="the controller's tick (default 0.001)"
     )
     parser.add_argument(
         "--page",

@@ -36,6 +36,7 @@ Array = NDArray[np.float64]
 POLL_S = 0.004
 LOOK_S = 0.04  # between two checks of the motion against the walls
 LEAST_LEAD_S = 0.04  # before the cycle's end, to which the line's and the driver's own time are added
+MOST_LEAD = 0.6  # of a cycle: with less of it seen, its end cannot be predicted
 POSE_LOST_S = 0.25  # three times the longest gap of a camera that loses every marker for a few frames
 STRAY_M = 0.08  # from the predicted motion: a robot that was lifted, pushed, or that does not move at all
 REMEMBERED_S = 3.0  # of sightings: longer than any cycle
@@ -108,6 +109,7 @@ class PilotedPlant:
             If the robot was vented on the way; `state` is then where it came to rest.
         """
         self._thinking_s = max(self._thinking_s, self._clock.now() - self._returned_s)
+        self._returned_s = math.inf  # a robot at rest waits for the driver
         played, coasts = _split(timeline)
         try:
             motion = self._played(played, gait, coasts) if played.end_s else None
@@ -116,7 +118,8 @@ class PilotedPlant:
         if coasts:
             motion = self._coast(timeline, motion)
         assert motion is not None  # a timeline is not empty
-        self._returned_s = self._clock.now()
+        if not coasts:
+            self._returned_s = self._clock.now()
         return motion
 
     @property
@@ -146,14 +149,14 @@ class PilotedPlant:
         if gait is None:
             tick_s = self._program.tick_s
             events, period = events_of(timeline, tick_s)
-            pressure_pa = round(1e3 * float(timeline.pressure_kpa[0]))
+            pressure_pa = round(1e3 * float(timeline.pressure_kpa[-1]))  # a ramp ends there
             self._line.cycle(None, period, pressure_pa, events, self._program.words)
         else:
             self._line.select(gait, None)
         motions = [run.run(timeline, self.state) for run in self._runs]
         begin_s = self._wait_for_cycle(cycles)
         self._log.played(begin_s, timeline)
-        lead_s = 0.0 if ends else self._lead_s()
+        lead_s = 0.0 if ends else min(self._lead_s(), MOST_LEAD * timeline.end_s)
         end_s = begin_s + timeline.end_s - lead_s
         look_s = begin_s + LOOK_S
         while self._clock.now() < end_s:

@@ -81,6 +81,27 @@ def add_planning_options(parser: Parser) -> None:
         help="drive.json of a drive calibrated by measurements: its uncertainty widens the margin",
     )
     parser.add_argument(
+        "--min-dwell",
+        type=positive_float,
+        default=0.02,
+        metavar="S",
+        help="least time between two switches of one segment, across changes of gait too, s (default "
+        "%(default)g)",
+    )
+    parser.add_argument(
+        "--tick",
+        type=positive_float,
+        default=0.001,
+        metavar="S",
+        help="controller's tick, s (default %(default)g)",
+    )
+    parser.add_argument(
+        "--pressure-rate",
+        type=positive_float,
+        metavar="KPA_S",
+        help="of the regulator, kPa/s (default: every change takes 0.1 s)",
+    )
+    parser.add_argument(
         "--cost", choices=COSTS, default="time", help="what the plan shall have little of (default time)"
     )
     parser.add_argument(

@@ -13,7 +13,7 @@ with the way as the error does. Where it is above a tenth of the clearance the t
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,6 @@ from planners.search.tree import Root, arrival_index, at_rest
 from srs_opt.model.outline import POINTS_PER_ARC
 from srs_opt.simulate.integrate import Trajectory
 from srs_opt.simulate.shapes import centre_lines
-from srs_opt.simulate.timeline import Timeline
 
 Array = NDArray[np.float64]
 TOLERANCE_M_S = 1e-5  # of the coarsest integration: half a metre per second errs by 0.1 mm in ten metres
@@ -120,11 +119,11 @@ class Certifier:
             same += 1
         cycles = known.cycles[:same]
         state = cycles[-1].final if cycles else self.root.state
-        for index in gaits[same:]:
-            gait = self.problem.gaits.gaits[index].gait
-            tolerance = TOLERANCE_M_S / FINER**level
-            cycles.append(self.problem.run.run(Timeline.of_gait(gait, gait.period_s), state, tolerance))
-            state = cycles[-1].final
+        before = gaits[same - 1] if same else self.root.gait
+        for gait in gaits[same:]:
+            timeline = self.problem.joints.timeline(before, gait)
+            cycles.append(self.problem.run.run(timeline, state, TOLERANCE_M_S / FINER**level))
+            before, state = gait, cycles[-1].final
         self._known[level] = _Played(list(gaits), cycles)
         return cycles
 
@@ -195,8 +194,8 @@ def _thinned(trajectory: Trajectory, stride: int) -> Trajectory:
     """Return the trajectory at every so many nodes, the first and the last among them."""
     last = trajectory.time_s.size - 1
     kept = np.unique(np.append(np.arange(0, last, stride), last))
-    names = ("time_s", "pose", "velocity", "work_j", "kappa", "dkappa")
-    return replace(trajectory, **{name: getattr(trajectory, name)[kept] for name in names})
+    nodes = [f.name for f in fields(trajectory) if f.name not in ("final", "error_m_s")]
+    return replace(trajectory, **{name: getattr(trajectory, name)[kept] for name in nodes})
 
 
 def _joined(played: Sequence[Trajectory]) -> tuple[Array, Array, Array, NDArray[np.int64]]:

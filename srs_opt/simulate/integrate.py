@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 
@@ -141,7 +142,7 @@ class Integrator:
         times, states, errors = [np.zeros(1)], [x[:, None]], []
         start = 0.0
         known: dict[bytes, Mesh] = {}
-        for piece, key, repeats in _runs_of_alike(_pieces(timeline)):
+        for piece, key, repeats in _runs_of_alike(self.pieces(timeline)):
             p = self.pack(float(piece.pressure_kpa[0]), float(piece.frequency_hz[0]))
             mesh = known.get(key) or Mesh.uniform(piece.duration_s, STEP_S)
             done = 1
@@ -161,6 +162,18 @@ class Integrator:
             np.concatenate(errors),
             self.layout,
         )
+
+    def pieces(self, timeline: Timeline) -> list[Timeline]:
+        """Cut a timeline into pieces of one pressure and frequency, a cycle each at most, to be integrated.
+
+        Linear actuators know pressure only times the valve's state, so that a cycle whose pressure changes
+        is one piece all the same.
+        """
+        if not self.actuator.linear:
+            return _pieces(timeline)
+        whole = replace(timeline, pressure_kpa=np.zeros(timeline.duration_s.size))
+        cut = np.cumsum([0, *(piece.duration_s.size for piece in _pieces(whole))])
+        return [timeline.part(slice(a, b)).at_one_pressure() for a, b in pairwise(cut)]
 
     def _alike(
         self, x: np.ndarray, mesh: Mesh, valve: np.ndarray, p: np.ndarray, many: int, tolerance: float
