@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from planners.motion.bending import Bending
+from planners.motion.valves import Joints
 
 SAMPLES = 16  # intervals per cycle at which pose and body are kept
 
@@ -48,6 +51,8 @@ class MotionTable:
     body : array (n + 1, n, SAMPLES + 1, points, 2)
         Centre line over that cycle in the robot's frame, tail to head.
     body_width_m : float
+    joints : Joints
+        How a cycle follows another; where none can, the arrays mean nothing.
     """
 
     names: tuple[str, ...]
@@ -58,6 +63,7 @@ class MotionTable:
     pose: NDArray[np.float32]
     body: NDArray[np.float32]
     body_width_m: float
+    joints: Joints
 
     @property
     def rest(self) -> int:
@@ -85,6 +91,14 @@ class MotionTable:
         local, after = ((1 - weight) * t[low] + weight * t[low + 1] for t in tables)
         return placed(local, x, y, heading), float(after)
 
+    def bent(self, bending: Bending) -> MotionTable:
+        """Return the table with measured factors on all its cycles."""
+        swing = self.course[None, :-1] - self.course[:, None]
+        share = np.linspace(0.0, 1.0, SAMPLES + 1)
+        pose = np.stack([bending.local(row, s[:, None], share) for row, s in zip(self.pose, swing)])
+        steady = np.array([bending.calibration.displacement(d) for d in self.steady])
+        return replace(self, pose=pose.astype(np.float32), steady=steady)
+
     def _level(self, before: int, speed_m_s: float) -> tuple[int, float]:
         levels = self.speed_m_s[before]
         low = int(np.searchsorted(levels, speed_m_s)) - 1
@@ -95,6 +109,11 @@ class MotionTable:
     def bodies(self, before: int, now: NDArray[np.int64] | slice, pose: Array) -> Array:
         """Return centre lines in the room, (gaits, SAMPLES + 1, points, 2), for poses of the same gaits."""
         return body_in_room(self.body[before, now], pose)
+
+    @cached_property
+    def allowed(self) -> NDArray[np.bool_]:
+        """Whether a gait can follow another (n + 1, n): a cycle that is simulated moves the body."""
+        return np.asarray(self.pose[:, :, 0].any(axis=(2, 3)))
 
     @cached_property
     def course(self) -> Array:

@@ -134,13 +134,13 @@ class LatticeSearch:
                 return None
             self._tried[cell] += 1
         self.simulated += 1
-        cycle = self.problem.simulate(self._tree.cycle[parent].state, gait)
+        cycle = self.problem.simulate(self._tree.cycle[parent].state, self._tree.gait[parent], gait)
         key = self._key(cycle, gait)
         if key in self._closed:
             return None
         # the start may be as near to a wall as it likes; no cycle may bring the body nearer than that
         slack = self.root_slack_m if parent == 0 else self.settings.slack_m
-        if not self.problem.body.keeps_margin(cycle.lines, slack):
+        if not self.problem.body.keeps_margin(cycle.lines, slack + (cycle.tube_m if parent else 0.0)):
             return None
         self._closed.add(key)
         return self._tree.add(parent, gait, spent, cycle)
@@ -166,6 +166,7 @@ class LatticeSearch:
         room = problem.body.estimate(lines).min(axis=1)
         left = remaining(problem, move.pose[:, -1], move.speed_m_s, s.by_heading)
         possible = (room > problem.margin_m - problem.field.error_m) & (left < BLOCKED_S / 2)
+        possible &= problem.motion.allowed[before]
         air = np.clip(1 - (room - problem.margin_m) / problem.motion.body_width_m, 0.0, 1.0)
         price = problem.tariff.of_cycles(self._gaits, move.pose, room - problem.margin_m)
         spent = self._tree.spent[node] + price
