@@ -1,4 +1,4 @@
-"""Cost-to-go over place, course and direction of travel: a vehicle with a least turning radius that can back up.
+"""Cost-to-go over place, course and direction of travel: a vehicle that turns no tighter than its gaits.
 
 The map of `costmap` knows places only, so it leads into corners that are too tight to turn in and past a
 goal that asks for a heading. Here every node also has one of 16 courses and a direction (forward or back),
@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,8 +24,8 @@ from srs_opt.gait_opt.table import GaitTable
 Array = NDArray[np.float64]
 COURSES = 16  # the directions of a knight's moves: straight edges in them have no rounding
 STEP_RAD = 2 * math.pi / COURSES
-# Nodes to the chord of the tightest turn by one course. Below 1.7 a turn and a straight move end alike; 5 tells
-# ways apart that differ by a millimetre or two, which is worth it while there are few states.
+# Nodes to the chord of the tightest turn by one course. Below 1.7 a turn and a straight move end alike; 5
+# tells ways apart that differ by a millimetre or two, which is worth it while there are few states.
 COARSE, FINE = 1.7, 5.0
 FEW_STATES, MOST_STATES = 250_000, 1_500_000  # about 100 bytes each while the map is made
 SLOW = 0.2  # of the top speed; slower turning gaits are not counted on
@@ -92,9 +92,7 @@ def turns_of(table: GaitTable) -> tuple[list[Turn], tuple[float, float]]:
         speeds = [abs(e.speed_m_s) for e in entries if e.radius_m is not None and abs(e.radius_m) <= most_m]
         return max(speeds, default=0.0)
 
-    radii = [
-        abs(e.radius_m) for e in table.gaits if e.radius_m is not None and abs(e.speed_m_s) > SLOW * top
-    ]
+    radii = [abs(e.radius_m) for e in table.gaits if e.radius_m is not None and abs(e.speed_m_s) > SLOW * top]
     turns = [
         Turn(radius, best(forward, 1.05 * radius), best(back, 1.05 * radius))
         for radius in ((min(radii), 2 * min(radii)) if radii else ())
@@ -151,7 +149,7 @@ def heading_map(
     number[free] = np.arange(free.sum(), dtype=np.int32)
     place = np.argwhere(free)
     per_metre = slowness(room[free])
-    edges: list[tuple[Array, Array, Array]] = []
+    edges: list[tuple[NDArray[Any], NDArray[Any], NDArray[Any]]] = []
 
     def add(offset: NDArray[np.int64], cost: Array, k: int, to: int, d: int) -> None:
         """Put edges from course k to another, by an offset in nodes, on the list."""

@@ -10,19 +10,14 @@ from __future__ import annotations
 
 import heapq
 import math
-from collections import Counter
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from planners.search.ahead import motion_lines, remaining
 from planners.search.costmap import BLOCKED_S
 from planners.search.problem import Cycle, Problem
 from planners.search.tree import Root, Step, Tree, arrival_index, at_rest, cell_of
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -46,9 +41,6 @@ class LatticeSettings:
         Beyond the margin, for what happens between the samples of a cycle.
     by_heading : bool
         Estimate what is left by place, course and direction of travel.
-    crowd_s : float
-        Price of every cycle that has already been tried into the same cell (of `cell_m` and `course_rad`,
-        not halved): leads the search out of corners where the estimate is too low. None: pure best-first.
     """
 
     cell_m: float = 0.02
@@ -61,19 +53,6 @@ class LatticeSettings:
     air_s: float = 0.3
     slack_m: float = 0.0005
     by_heading: bool = False
-    crowd_s: float = 0.0
-
-
-class _Proposal(NamedTuple):
-    """A cycle that may be simulated: rank, order, parent, gait, price up to its end, cell, tried there."""
-
-    rank: float
-    order: int
-    parent: int
-    gait: int
-    spent: float
-    cell: tuple[int, int, int]
-    tried: int
 
 
 class LatticeSearch:
@@ -90,8 +69,7 @@ class LatticeSearch:
         self.simulated = 0
         self._tree = Tree()
         self._closed: set[tuple[int, ...]] = set()
-        self._open: list[_Proposal] = []
-        self._tried: Counter[tuple[int, int, int]] = Counter()
+        self._open: list[tuple[float, int, int, int, float]] = []
         self._count = 0
         motion = problem.motion
         first = Cycle(root.state, root.state[None, :3], np.zeros((0, 1, 2)))
@@ -124,15 +102,7 @@ class LatticeSearch:
 
     def _take(self) -> int | None:
         """Simulate the most promising proposal; return its node if it is new and clear."""
-        best = heapq.heappop(self._open)
-        _, _, parent, gait, spent, cell, tried = best
-        if self.settings.crowd_s:
-            more = self._tried[cell] - tried
-            if more:  # others have been tried there since this one was put on the list
-                rank = best.rank + self.settings.crowd_s * more
-                heapq.heappush(self._open, best._replace(rank=rank, tried=tried + more))
-                return None
-            self._tried[cell] += 1
+        _, _, parent, gait, spent = heapq.heappop(self._open)
         self.simulated += 1
         cycle = self.problem.simulate(self._tree.cycle[parent].state, self._tree.gait[parent], gait)
         key = self._key(cycle, gait)
@@ -172,22 +142,6 @@ class LatticeSearch:
         spent = self._tree.spent[node] + price
         spent = spent + s.change_s * (self._gaits != before) + s.air_s * air
         rank = spent + s.greed * left
-        cells = self._crowd_cells(move.pose[:, -1])
         for gait in np.flatnonzero(possible):
             self._count += 1
-            cell = cells[gait]
-            tried = self._tried[cell] if s.crowd_s else 0
-            crowded = float(rank[gait]) + s.crowd_s * tried
-            heapq.heappush(
-                self._open,
-                _Proposal(crowded, self._count, node, int(gait), float(spent[gait]), cell, tried),
-            )
-
-    def _crowd_cells(self, end: Array) -> list[tuple[int, int, int]]:
-        """Return the cell that each gait's cycle is expected to end in."""
-        s = self.settings
-        if not s.crowd_s:
-            return [(0, 0, 0)] * len(end)
-        course = (end[:, 2] + self.problem.motion.course[:-1]) % (2 * math.pi)
-        cells = np.floor(np.stack([end[:, 0] / s.cell_m, end[:, 1] / s.cell_m, course / s.course_rad], axis=1))
-        return [(a, b, c) for a, b, c in cells.astype(int).tolist()]
+            heapq.heappush(self._open, (float(rank[gait]), self._count, node, int(gait), float(spent[gait])))

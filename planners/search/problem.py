@@ -32,7 +32,10 @@ from srs_opt.simulate.together import together
 
 Array = NDArray[np.float64]
 ROUNDING_M = 1e-6
-DETOUR_TIMES, DETOUR_LENGTHS = 1.5, 16.0  # of the shortest way, and body lengths: farther off is not looked at
+DETOUR_TIMES, DETOUR_LENGTHS = (
+    1.5,
+    16.0,
+)  # of the shortest way, and body lengths: farther off is not looked at
 STEP_S = 0.002  # errs by about 0.04 mrad per cycle
 
 
@@ -122,9 +125,7 @@ class Problem:
         """Price of the way to the goal by place, course and direction of travel."""
         half, start = self.robot.body_width_m / 2, self.start
         radius = 0.1 * self.robot.length_m
-        from_start = cost_map(
-            self.field, Goal(start.x, start.y, radius), self.gaits, half, self._per_metre
-        )
+        from_start = cost_map(self.field, Goal(start.x, start.y, radius), self.gaits, half, self._per_metre)
         least = float(self.to_goal.at(np.array([start.x, start.y])))
         detour = DETOUR_LENGTHS * self.robot.length_m / self.tariff.top_speed_m_s
 
