@@ -32,10 +32,8 @@ from srs_opt.simulate.together import together
 
 Array = NDArray[np.float64]
 ROUNDING_M = 1e-6
-DETOUR_TIMES, DETOUR_LENGTHS = (
-    1.5,
-    16.0,
-)  # of the shortest way, and body lengths: farther off is not looked at
+# Of the shortest way, and body lengths more: longer detours are not looked at.
+DETOUR_TIMES, DETOUR_LENGTHS = 1.5, 16.0
 STEP_S = 0.002  # errs by about 0.04 mrad per cycle
 
 

@@ -23,8 +23,7 @@ def wrapped(problem, gaits, room_m):
     bodies = [straight, *shapely.buffer(shapely.linestrings(c.lines), 0.02 + room_m)]
     free = shapely.union_all(bodies)
     box = tuple(float(v) for v in shapely.buffer(free, 0.02).bounds)
-    outside = shapely.constrained_delaunay_triangles(shapely.box(*box) - free)
-    solid = list(shapely.get_parts(outside))
+    solid = shapely.get_parts(shapely.box(*box) - free)
     end = c.pose[-1]
     return replace(
         problem.maze,
