@@ -54,7 +54,7 @@ def motion_record(problem: Problem, plan: Plan, execution: Execution | None = No
         "robot": problem.robot.name,
         "body_width_m": problem.robot.body_width_m,
         "margin_m": problem.margin_m,
-        "maze": _maze(problem.maze),
+        "maze": maze_record(problem.maze),
         "gaits": [_gait(problem.gaits.gaits[k]) for k in used],
         "runs": runs,
     }
@@ -95,7 +95,8 @@ def _gait(entry: TableGait) -> dict[str, Any]:
     }
 
 
-def _maze(maze: Maze) -> dict[str, Any]:
+def maze_record(maze: Maze) -> dict[str, Any]:
+    """Return bounds, wall outlines, cells, start and goal as motion.json holds them."""
     rings = []
     if len(maze.walls):
         inside = maze.walls.union & shapely.box(*maze.bounds)

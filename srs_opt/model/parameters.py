@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -30,6 +29,7 @@ ROBOT_PARAMETERS = (
     "tau2_s",
 )
 COMPLIANCE_PARAMETERS = ("bending_stiffness_n_m2", "bending_relaxation_s", "gap_stiffness_n_m2")
+_RIGID_N_M2 = 1e15  # what is absent: below rounding beside any stiffness, and with finite derivatives
 GAIT_PARAMETERS = ("pressure_kpa", "frequency_hz")
 
 
@@ -164,7 +164,7 @@ class Parameters:
         values: list[float] = [float(getattr(robot, name)) for name in ROBOT_PARAMETERS]
         if self.structure.compliant:
             given = (getattr(robot, name) for name in COMPLIANCE_PARAMETERS)
-            values += [math.inf if value is None else value for value in given]  # absent: rigid
+            values += [_RIGID_N_M2 if value is None else value for value in given]
         values += [pressure_kpa, frequency_hz]
         specs = dynamic_effects(robot, room=True)
         wanted = [s for s in specs if s["name"] in self.structure.effects]

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 POSE, VELOCITY, WORK = slice(0, 3), slice(3, 6), 6
 BODY_STATES = 7
 
@@ -56,3 +58,21 @@ class StateLayout:
         """Entries that obey the equations of motion and that a gait repeats: velocity, and bends if free."""
         bends = [*range(self.kappa.start, self.dkappa.stop)] if self.compliant else []
         return [*range(VELOCITY.start, VELOCITY.stop), *bends]
+
+    def adopt(self, state: np.ndarray, source: StateLayout) -> np.ndarray:
+        """Return the state (size,) of this layout that another model of the same snake stands for.
+
+        Place, speed, bends and the actuators' curvatures are taken over; memories of effects start anew, and
+        work is counted from here. Where this model prescribes the curvature, it is that of the actuators.
+        """
+        adopted, known = np.zeros(self.size), 2 * self.segments
+        adopted[:WORK] = state[:WORK]
+        adopted[self.kappa.start : self.dkappa.stop] = state[source.kappa.start : source.dkappa.stop]
+        first, origin = self.actuator.start, source.actuator.start
+        adopted[first : first + known] = state[origin : origin + known]
+        return adopted
+
+    @property
+    def periodic(self) -> list[int]:
+        """Entries that a steady gait repeats: all but pose and work."""
+        return [*range(VELOCITY.start, VELOCITY.stop), *range(BODY_STATES, self.size)]

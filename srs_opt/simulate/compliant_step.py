@@ -3,7 +3,7 @@
 The equations of motion are kept implicit, g(Y, Y', Y'') = 0 (see `srs_opt.model.bending_chain`): RODAS is
 stiffly accurate and of full order for such equations of index 1, so no stage inverts the mass matrix. Of the
 stages' unknowns (places, velocities, accelerations) all but the velocities are eliminated, which leaves one
-matrix of order N + 2 per step,
+matrix of order N + 2 per step, which is factorized in time linear in N (`srs_opt.model.chain_matrix`),
 
     E = M - h gamma dg/dY' - (h gamma)^2 dg/dY.
 
@@ -21,11 +21,11 @@ import casadi as ca
 
 from srs_opt.model.actuator import Actuator, ActuatorState
 from srs_opt.model.bending_chain import BendingChain, Drive
+from srs_opt.model.chain_derivatives import derivatives, mass_matrix
 from srs_opt.model.compliant import CompliantModel
 from srs_opt.model.parameters import Structure
 from srs_opt.model.registry import build, state_layout
 from srs_opt.model.state import BODY_STATES, POSE, VELOCITY, WORK
-from srs_opt.simulate.dense import LU
 from srs_opt.simulate.tableau import COUPLING, GAMMA, LEVER_M, NODES, STAGES, TIME_WEIGHTS
 
 
@@ -100,12 +100,12 @@ def _stages(
     start = drive(act)
     rates = actuator.rates(act, valve)
     force, power = chain.residual(y, dy, zero, start, ca.SX(1))
-    acceleration = LU(chain.mass_matrix(y)).solve(force)
-    slopes = chain.derivatives(y, dy, acceleration, start)
+    acceleration = mass_matrix(chain, y).solver()(force)
+    slopes = derivatives(chain, y, dy, acceleration, start)
     acceleration = h * acceleration
     in_time = chain.moment_rate(rates.kappa, rates.dkappa)
     step = h * GAMMA
-    solver = LU(slopes.mass - step * slopes.by_rate - step**2 * slopes.by_place)
+    solve = slopes.mass.plus(slopes.by_rate, -step).plus(slopes.by_place, -(step**2)).solver()
     k: list[_Increment] = []
     last: tuple[float, ...] = (*STAGES[4], 1.0)
     for i in range(6):
@@ -121,13 +121,13 @@ def _stages(
         r_place = h * (dy + at.velocity) + coupled.place
         r_velocity = acceleration + at.acceleration + coupled.velocity
         right = residual + h * h * TIME_WEIGHTS[i] * in_time
-        right += slopes.mass @ r_velocity + step * (slopes.by_place @ r_place)
-        velocity = solver.solve(GAMMA * right)
+        right += slopes.mass.times(r_velocity) + step * slopes.by_place.times(r_place)
+        velocity = solve(GAMMA * right)
         place = GAMMA * (r_place + h * velocity)
         work = power + coupled.work + h * (slopes.power_by_rate @ velocity + slopes.power_by_place @ place)
         k.append(_Increment(place, velocity, velocity / GAMMA - r_velocity, GAMMA * work))
     error = k[5].velocity
-    squared = error.T @ slopes.mass @ error / chain.model.total_mass()
+    squared = error.T @ slopes.mass.times(error) / chain.model.total_mass()
     return [_scaled(w, i) for w, i in zip((*last, 1.0), k)], squared, shapes[1.0]
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 
@@ -18,7 +19,8 @@ from srs_opt.simulate.rosenbrock import step_function
 from srs_opt.simulate.timeline import Timeline
 from srs_opt.simulate.together import Search, Stretch, alone
 
-_REFINEMENTS = 3
+_REFINEMENTS = 3  # of a mesh, coarser here and finer there; after them it only gets finer
+_ATTEMPTS = 12
 STEP_S = 0.005  # first guess of the step
 LOOSE = 8.0  # a mesh is kept while no step errs by more than this many tolerances
 MANY = 32  # alike pieces integrated in one call
@@ -77,6 +79,15 @@ class Trajectory:
             kappa = PchipInterpolator(self.time_s, self.kappa, axis=0)(time_s)
         return pose, kappa
 
+    def then(self, later: Trajectory) -> Trajectory:
+        """Return this motion and the one that goes on from its final state as one."""
+        joined = {
+            f.name: np.concatenate([getattr(self, f.name), getattr(later, f.name)[1:]]) for f in fields(self)
+        }
+        joined["time_s"][self.time_s.size :] += self.time_s[-1]
+        joined |= {"final": later.final, "error_m_s": np.concatenate([self.error_m_s, later.error_m_s])}
+        return Trajectory(**joined)
+
 
 class Integrator:
     """Runs one robot's model; holds the compiled step and nothing that changes."""
@@ -130,7 +141,7 @@ class Integrator:
         times, states, errors = [np.zeros(1)], [x[:, None]], []
         start = 0.0
         known: dict[bytes, Mesh] = {}
-        for piece, key, repeats in _runs_of_alike(_pieces(timeline)):
+        for piece, key, repeats in _runs_of_alike(self.pieces(timeline)):
             p = self.pack(float(piece.pressure_kpa[0]), float(piece.frequency_hz[0]))
             mesh = known.get(key) or Mesh.uniform(piece.duration_s, STEP_S)
             done = 1
@@ -151,6 +162,18 @@ class Integrator:
             self.layout,
         )
 
+    def pieces(self, timeline: Timeline) -> list[Timeline]:
+        """Cut a timeline into pieces of one pressure and frequency, a cycle each at most, to be integrated.
+
+        Linear actuators know pressure only times the valve's state, so that a cycle whose pressure changes
+        is one piece all the same.
+        """
+        if not self.actuator.linear:
+            return _pieces(timeline)
+        whole = replace(timeline, pressure_kpa=np.zeros(timeline.duration_s.size))
+        cut = np.cumsum([0, *(piece.duration_s.size for piece in _pieces(whole))])
+        return [timeline.part(slice(a, b)).at_one_pressure() for a, b in pairwise(cut)]
+
     def _alike(
         self, x: np.ndarray, mesh: Mesh, valve: np.ndarray, p: np.ndarray, many: int, tolerance: float
     ) -> Search[tuple[np.ndarray, np.ndarray, Mesh, int]]:
@@ -158,7 +181,7 @@ class Integrator:
 
         Returns states (nx, n), errors (n,), the mesh of each piece and how many pieces were done.
         """
-        for _ in range(_REFINEMENTS):
+        for attempt in range(_ATTEMPTS):
             repeated = mesh.repeated(many, valve.shape[1])
             states, errors = yield from self.stepping(x, repeated, np.tile(valve, many), p)
             worst = errors.reshape(many, -1).max(axis=1)
@@ -166,7 +189,9 @@ class Integrator:
             if good:
                 kept = good * mesh.h_s.size
                 return states[:, :kept], errors[:kept], mesh, good
-            mesh, many = mesh.refined(errors[: mesh.h_s.size], tolerance), 1
+            # stretches at rest look easy until their steps are longer than what happens at their end
+            least = tolerance if attempt >= _REFINEMENTS else 0.0
+            mesh, many = mesh.refined(np.maximum(errors[: mesh.h_s.size], least), tolerance), 1
         states, errors = yield from self.stepping(x, mesh, valve, p)
         return states, errors, mesh, 1
 

@@ -1,6 +1,7 @@
 """The compliant model against another derivation, conservation laws, symmetries and limits."""
 
 import dataclasses
+import json
 import math
 import sys
 from pathlib import Path
@@ -17,10 +18,12 @@ import oracle_snake as oracle
 from srs_opt.errors import InputError
 from srs_opt.gait import Wave
 from srs_opt.model.bending_chain import BendingChain, Drive
+from srs_opt.model.chain_derivatives import derivatives
 from srs_opt.model.inverse import inverse_dynamics
 from srs_opt.model.parameters import Structure
 from srs_opt.model.registry import build
 from srs_opt.robot import wpi_srs
+from srs_opt.simulate.__main__ import main
 from srs_opt.simulate.integrate import Integrator
 from srs_opt.simulate.mesh import Mesh
 from srs_opt.simulate.run import motion_of_cycle
@@ -77,8 +80,8 @@ def test_equations_agree_with_a_lagrangian_in_other_coordinates(links, effects):
     y, dy, ddy = (ca.SX.sym(name, chain.size) for name in ("y", "dy", "ddy"))
     drive = Drive(ca.SX.sym("k", links - 1), ca.SX.sym("dk", links - 1), ca.SX.sym("frame", 3))
     g, power = chain.residual(y, dy, ddy, drive, ca.SX(1))
-    d = chain.derivatives(y, dy, ddy, drive)
-    ours = [d.mass, d.by_rate, d.by_place, d.power_by_rate, d.power_by_place]
+    d = derivatives(chain, y, dy, ddy, drive)
+    ours = [d.mass.dense(), d.by_rate.dense(), d.by_place.dense(), d.power_by_rate, d.power_by_place]
     direct = [-ca.jacobian(g, ddy), ca.jacobian(g, dy), ca.jacobian(g, y)]
     direct += [ca.jacobian(power, dy), ca.jacobian(power, y)]
     inputs = [y, dy, ddy, drive.no_load, drive.no_load_rate, drive.frame, parameters.vector]
@@ -325,6 +328,20 @@ def test_gaps_are_springs_in_series():
     ]
     np.testing.assert_allclose(ends[1], ends[0], rtol=1e-8)
     np.testing.assert_allclose(ends[2], ends[0], rtol=1e-8)
+
+
+def test_commands_take_the_robots_own_model(tmp_path, capsys):
+    robot = tmp_path / "soft.yaml"
+    robot.write_text("bending_stiffness_n_m2: 0.005\n")
+    shared = ["--json", "--duration", "8", "--out", str(tmp_path / "out")]
+    speeds = {}
+    for options in ((), ("--model", "complex")):
+        assert main([*shared, "--robot", str(robot), *options]) == 0
+        speeds[options] = json.loads(capsys.readouterr().out)["speed_m_s"]
+    assert speeds[()] == pytest.approx(0.246, rel=0.01)
+    assert speeds["--model", "complex"] == pytest.approx(0.2315, rel=0.01)
+    assert main([*shared, "--model", "compliant"]) == 2
+    assert "is rigid" in capsys.readouterr().err
 
 
 def test_default_model_follows_the_robot_file():
