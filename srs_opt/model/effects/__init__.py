@@ -13,12 +13,20 @@ if TYPE_CHECKING:
     from srs_opt.model.effects.effect import Effect
 
 
-@lru_cache(maxsize=1)
 def all_effects() -> Mapping[str, Effect]:
-    """Return every known effect by name, in a fixed order: by what it acts on, then by name; own ones last."""
+    """Return every known effect by name, ordered by what it acts on, then by name; own ones last."""
     from srs_opt.model.effects.own import registered
 
-    return MappingProxyType({**built_in(), **{name: own.effect for name, own in registered().items()}})
+    own = registered()
+    return _together(tuple((name, entry.definition) for name, entry in own.items()))
+
+
+@lru_cache(maxsize=4)
+def _together(own: tuple[tuple[str, str], ...]) -> Mapping[str, Effect]:
+    from srs_opt.model.effects.own import registered
+
+    known = registered()
+    return MappingProxyType({**built_in(), **{name: known[name].effect for name, _ in own}})
 
 
 @lru_cache(maxsize=1)
@@ -29,7 +37,8 @@ def built_in() -> Mapping[str, Effect]:
 
     names = [module.name for module in pkgutil.iter_modules(library.__path__)]
     found = [importlib.import_module(f"{library.__name__}.{name}").EFFECT for name in names]
-    return MappingProxyType({e.name: e for e in sorted(found, key=lambda e: (KINDS.index(e.kind), e.name))})
+    found.sort(key=lambda e: (KINDS.index(e.kind), e.marker is None, e.name))  # markers come before cameras
+    return MappingProxyType({e.name: e for e in found})
 
 
 def register_effect(effect: Effect) -> Effect:
@@ -52,7 +61,6 @@ def register_effect(effect: Effect) -> Effect:
     from srs_opt.model.effects import own
 
     own.add(effect, set(built_in()))
-    all_effects.cache_clear()
     return effect
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import hashlib
 import inspect
 import re
@@ -88,7 +87,7 @@ def check(effect: Effect, built_in: set[str]) -> None:
     if effect.size.typical == 0:
         raise InputError(f"effect '{name}': the typical size of '{effect.size.name}' must not be 0")
     if kinds.count(Place) > 1 or kinds.count(Direction) > 1 or kinds.count(Towards) not in (0, 2):
-        raise InputError(f"effect '{name}': at most one place, one direction, and one point (two coordinates)")
+        raise InputError(f"effect '{name}': at most one place, one direction, one point (two coordinates)")
     if not effect.hooks:
         raise InputError(f"effect '{name}' has no hook: it acts on nothing; hooks are {', '.join(HOOKS)}")
 
@@ -99,8 +98,8 @@ def definition(effect: Effect) -> str:
     for hook in _hooks(effect):
         digest.update(b"hook")
         code = getattr(hook, "__code__", None)
-        if code is None:
-            digest.update(repr(dataclasses.astuple(hook) if dataclasses.is_dataclass(hook) else type(hook)).encode())  # type: ignore[call-overload]
+        if code is None:  # an object that can be called
+            digest.update(repr(hook).encode())
             continue
         constants = [c for c in code.co_consts if isinstance(c, (int, float, str, type(None)))]
         digest.update(code.co_code + repr(constants).encode())
@@ -153,11 +152,8 @@ def adopt(effects: bytes) -> None:
         return
     import pickle
 
-    from srs_opt.model.effects import all_effects
-
     for entry in pickle.loads(effects):
         known = _own.setdefault(entry.effect.name, entry)
         if known.definition != entry.definition:
             raise InputError(f"effect '{entry.effect.name}' was registered before with another definition")
     _adopted.add(effects)
-    all_effects.cache_clear()

@@ -10,6 +10,6 @@ EFFECT = Effect(
     "actuation",
     (EffectParameter("ratio", "", 0.18, lower=0),),
     what="the segments bend less than the curvature per pressure of the bench, by a constant share",
-    look="repeat the bench test of curvature over pressure on the assembled robot: only it tells this from C0",
+    look="repeat the bench test of curvature over pressure on the assembled robot: only that tells it",
     gain=lambda e, frequency: 1 / (1 + e["ratio"]),
 )

@@ -7,6 +7,7 @@ import casadi as ca
 from srs_opt.model.effects.effect import Effect, Symbols
 from srs_opt.model.effects.parameter import EffectParameter
 
+
 def _camera(e: Symbols, x: ca.SX, y: ca.SX) -> tuple[ca.SX, ca.SX]:
     factor = 1 + e["per_m"] * x
     return x * factor, y * factor

@@ -7,6 +7,7 @@ import casadi as ca
 from srs_opt.model.effects.effect import Effect, LinkState, Symbols, to_body_frame
 from srs_opt.model.effects.parameter import Direction, EffectParameter
 
+
 def _force(e: Symbols, s: LinkState) -> tuple[ca.SX, ca.SX]:
     weight = s.mass * s.gravity * ca.sin(e["angle"])
     return to_body_frame(weight * ca.cos(e["direction"]), weight * ca.sin(e["direction"]), s.heading)

@@ -10,6 +10,6 @@ EFFECT = Effect(
     "body",
     (EffectParameter("extra_m", "m", 0.008),),
     what="the unactuated gaps between the chambers are longer (or shorter) than documented",
-    look="measure the distance between neighbouring wheel pairs; a ruler in the picture tells it from a scale",
+    look="measure the distance between wheel pairs; a ruler in the picture tells it from camera_scale",
     gap_extra=lambda e: e["extra_m"],
 )

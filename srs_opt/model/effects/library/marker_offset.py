@@ -7,6 +7,7 @@ import casadi as ca
 from srs_opt.model.effects.effect import Effect, Symbols
 from srs_opt.model.effects.parameter import Component, EffectParameter
 
+
 def _marker(e: Symbols, x: ca.SX, y: ca.SX, theta: ca.SX) -> tuple[ca.SX, ca.SX]:
     c, s = ca.cos(theta), ca.sin(theta)
     return x + c * e["dx_m"] - s * e["dy_m"], y + s * e["dx_m"] + c * e["dy_m"]

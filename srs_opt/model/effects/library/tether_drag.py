@@ -7,6 +7,7 @@ import casadi as ca
 from srs_opt.model.effects.effect import Effect, LinkState, Symbols, on_link
 from srs_opt.model.effects.parameter import EffectParameter
 
+
 def _force(e: Symbols, s: LinkState) -> tuple[ca.SX, ca.SX]:
     v_x, v_y = s.v_x[0], s.v_y[0]
     pull = -e["force_n"] / ca.sqrt(v_x**2 + v_y**2 + s.friction_speed**2)

@@ -7,6 +7,7 @@ import casadi as ca
 from srs_opt.model.effects.effect import Effect, LinkState, Symbols, on_link, to_body_frame
 from srs_opt.model.effects.parameter import EffectParameter, Towards
 
+
 def _force(e: Symbols, s: LinkState) -> tuple[ca.SX, ca.SX]:
     dx, dy = e["ax_m"] - s.room_x[0], e["ay_m"] - s.room_y[0]
     # one micrometre keeps the direction defined on the anchor itself

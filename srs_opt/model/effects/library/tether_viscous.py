@@ -7,6 +7,7 @@ import casadi as ca
 from srs_opt.model.effects.effect import Effect, LinkState, Symbols, on_link
 from srs_opt.model.effects.parameter import EffectParameter
 
+
 def _force(e: Symbols, s: LinkState) -> tuple[ca.SX, ca.SX]:
     n = s.v_x.shape[0]
     return on_link(n, 0, -e["damping"] * s.v_x[0]), on_link(n, 0, -e["damping"] * s.v_y[0])
