@@ -1,6 +1,7 @@
 """One suite over everything that is registered, a plugin's effect included."""
 
 import math
+from dataclasses import replace
 
 import casadi as ca
 import numpy as np
@@ -18,6 +19,7 @@ from srs_opt.measurement.dataset import load_dataset
 from srs_opt.measurement.records import Trial
 from srs_opt.model.effects import all_effects, built_in, own
 from srs_opt.model.effects.effect import HOOKS
+from srs_opt.model.effects.parameter import Component
 from srs_opt.model.parameters import Structure
 from srs_opt.model.registry import build
 from srs_opt.plugins import load_plugin
@@ -116,9 +118,9 @@ def test_slopes_of_the_picture_are_those_of_differences(track, name):
     slopes = experiment.predict(trial, Point(start), form.sizes, fine).slopes
     for k, c in enumerate(form.sizes):
         h = 2e-3 * c.typical
-        ends = [experiment.predict(trial, Point({**start, c.name: s * h}), (), fine).points for s in (1, -1)]
-        difference = (ends[0] - ends[1]) / (2 * h)
-        # between a pull to the east and one to the north the second component is a turn, to first order
+        signs = (1, -1) if c.lower < 0 else (1, 0)
+        ends = [experiment.predict(trial, Point({**start, c.name: s * h}), (), fine).points for s in signs]
+        difference = (ends[0] - ends[1]) / ((signs[0] - signs[1]) * h)
         assert np.linalg.norm(slopes[:, :, k] - difference) < 0.06 * np.linalg.norm(difference)
 
 
@@ -139,7 +141,8 @@ def test_what_must_dissipate_does(name):
 @pytest.mark.parametrize("name", NAMES)
 def test_round_trip_through_the_robot_file(name, tmp_path):
     effect = all_effects()[name]
-    entry = {**entry_of(name), "sd": {effect.size.name: 0.1 * effect.size.typical}}
+    sizes = [effect.size, *(p for p in effect.parameters if isinstance(p, Component))]
+    entry = {**entry_of(name), "sd": {p.name: 0.1 * p.typical for p in sizes}}
     robot = wpi_srs().with_values(effects=[entry])
     saved = load_robot(save_robot(robot, tmp_path / "robot.yaml"))
     assert dict(saved.effects[0]) == dict(robot.effects[0]) == entry
@@ -173,10 +176,9 @@ def test_its_size_is_calibrated_within_its_interval(name, tmp_path):
     true = {**truth.effects[0], "name": name}
     effect = all_effects()[name]
     entry = {**true, effect.size.name: 0.5 * true[effect.size.name]}
-    entry["sd"] = {effect.size.name: 2 * abs(effect.size.typical)}
+    sizes = [effect.size, *(p for p in effect.parameters if isinstance(p, Component))]
+    entry["sd"] = {p.name: 2 * abs(p.typical) for p in sizes}
     dataset = load_dataset(tmp_path / "set")
-    from dataclasses import replace
-
     found = calibrate(replace(dataset, robot=dataset.robot.with_values(effects=[entry])))
     assert found.after < 1.05
     (after,) = found.robot.effects
