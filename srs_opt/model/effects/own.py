@@ -130,7 +130,7 @@ def exported() -> bytes | None:
     own = [r for r in _own.values() if not r.installed]
     if not own:
         return None
-    from joblib.externals import cloudpickle
+    import cloudpickle
 
     modules = {getattr(hook, "__module__", None) for r in own for hook in _hooks(r.effect)}
     by_value = [sys.modules[m] for m in modules if m in sys.modules and m.split(".")[0] not in _SHARED]
