@@ -22,6 +22,7 @@ from planners.search.tree import Root, arrival_index
 from srs_opt.errors import InputError, NoAnswerError
 from srs_opt.model.parameters import valve_delay_s
 from srs_opt.robot import Robot
+from srs_opt.simulate.timeline import Timeline
 
 Array = NDArray[np.float64]
 ASTRAY_M = 0.06  # farther from the plan than this: plan anew
@@ -52,6 +53,10 @@ class Execution:
     replans : int
     gaits : tuple of int
         Played, a cycle each.
+    starts_s : tuple of float
+        When those cycles began.
+    halts : tuple of (start_s, Timeline)
+        What the valves did to come to rest; before the cycle after a halt is rest.
     reason : str
         Why it ended, in words.
     time_s, pose, lines : arrays (n,), (n, 3), (n, points, 2)
@@ -65,6 +70,8 @@ class Execution:
     duration_s: float
     replans: int
     gaits: tuple[int, ...]
+    starts_s: tuple[float, ...]
+    halts: tuple[tuple[float, Timeline], ...]
     reason: str
     time_s: Array
     pose: Array
@@ -118,6 +125,8 @@ class Drive:
         self.learned = Learned()
         self.replans = self.halts = 0
         self.played: list[int] = []
+        self.starts_s: list[float] = []
+        self.halted: list[tuple[float, Timeline]] = []
         self._follow(plan)
         self.most_cycles = 20 + math.ceil(PATIENCE * len(plan.gaits))
 
@@ -216,7 +225,7 @@ class Drive:
     def _room_m(self, state: Array, gait: int) -> float:
         """Return the least clearance over a cycle with any friction that the robot may have."""
         timeline = self.problem.joints.timeline(self.before, gait)
-        return self.foresight.least_room_m(state, timeline, 0.0)
+        return self.foresight.least_room_m(state, timeline, 0.0, (self.before, gait))
 
     def _gait_by_plan(self, state: Array) -> int | None:
         """Return the gait that the plan plays next, if the robot is as the plan has it after a cycle."""
@@ -253,16 +262,18 @@ class Drive:
         begin, before = self.state[:3].copy(), self.state
         cycle = self.problem.joints.timeline(self.before, index)
         plain = self.problem.joints.is_plain(self.before, index)
+        start_s = self.watch.time_s
         trajectory = self.plant.play(cycle, index if plain else None)
         arrived = self.watch.look(trajectory.time_s, trajectory.pose, trajectory.kappa)
         self.state = self.plant.state
         self.played.append(index)
-        self.before = index
+        self.starts_s.append(start_s)
+        gait_before, self.before = self.before, index
         if self.watch.touched:
             return "contact"
         if arrived:
             return "arrived"
-        self.foresight.learn(before, cycle, self.state)
+        self.foresight.learn(before, cycle, self.state, (gait_before, index))
         c, s = math.cos(begin[2]), math.sin(begin[2])
         dx, dy, turn = self.state[:3] - begin
         observed = np.array([c * dx + s * dy, c * dy - s * dx, turn])
@@ -281,7 +292,9 @@ class Drive:
         """Bring the robot to rest where there is room for it; return whether it came to no harm."""
         self.halts += 1
         try:
-            trajectory = self.plant.play(halt(self.foresight, self.state, self.before), None)
+            valves = halt(self.foresight, self.state, self.before)
+            self.halted.append((self.watch.time_s, valves))
+            trajectory = self.plant.play(valves, None)
         except PlantStopped as stopped:  # it vented by itself
             if not stopped.may_go_on:
                 raise
@@ -308,6 +321,8 @@ class Drive:
             float(time[-1]) + self.delay_s,
             self.replans,
             tuple(self.played),
+            tuple(self.starts_s),
+            tuple(self.halted),
             reason,
             time,
             pose,

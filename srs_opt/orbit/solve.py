@@ -3,7 +3,7 @@
 The actuators' periodic state is known first (closed form where they are linear), so only the dynamic states
 at the start of the cycle are unknown: the body's three velocities, and in the compliant model the bends and
 their rates. Their monodromy matrix is carried through the period with the exact derivative of every
-integration step.
+integration step; for the compliant model's many by differences a hair wide, on the same mesh.
 
 A soft body can have several stable orbits under one gait, so there the orbit is the one that is reached from
 rest: the motion is simulated until it has all but settled, and Newton only finishes it.
@@ -39,9 +39,13 @@ _ROUGH_M_S = 1e-3
 _MESHES = 4
 _BEND_TIME_S = 0.05  # turns a bend into a rate: about 1/omega of a soft body's slowest mode
 # from rest: Newton starts where so many cycles in a row change by less than this, and must end within so many
-# of the last changes (a multiplier of 0.95 leaves 20 of them to go)
-_NEARLY_M_S, _QUIET_PERIODS, _NEAR = 2e-3, 3, 30.0
-_MOST_PERIODS = 400
+# times what the last change says is left to go, and within reach
+_NEARLY_M_S, _QUIET_PERIODS, _NEAR, _FARTHEST_M_S = 2e-3, 3, 3.0, 0.15
+_SAME_M_S = (
+    2e-3  # Newton's mesh is finer than that on which the motion settled, which moves the orbit a little
+)
+_MOST_PERIODS = 200
+_HALVINGS = 5
 
 
 @dataclass(frozen=True)
@@ -146,7 +150,9 @@ def _reached_from(cycle: Cycle, x: np.ndarray, mesh: Mesh, tolerance: float) -> 
                 raise
         else:
             away = cycle.size(found.start[cycle.run.layout.dynamic] - before)
-            if found.largest_multiplier < 1 and away <= _NEAR * change + 1e-6:
+            largest = found.largest_multiplier
+            # what is left to go: the changes to come are a geometric series
+            if largest < 1 and away <= _SAME_M_S + min(_NEAR * change / (1 - largest), _FARTHEST_M_S):
                 return found
         goal = change / 10
     raise cycle.no_answer(
@@ -157,15 +163,21 @@ def _reached_from(cycle: Cycle, x: np.ndarray, mesh: Mesh, tolerance: float) -> 
 
 def _accurate_lap(cycle: Cycle, x: np.ndarray, mesh: Mesh, tolerance: float) -> Search[tuple[Lapped, Mesh]]:
     """Return a lap from state `x` on a mesh that is fine enough for it."""
-    for _ in range(_REFINEMENTS):
+    for attempt in range(3 * _REFINEMENTS):
         lapped = yield from plain_lap(cycle.run, x, mesh, cycle.valve, cycle.p)
+        for _ in range(_HALVINGS):  # steps can be so long that the motion leaves what numbers can hold
+            if np.isfinite(lapped.states[:, -1]).all():
+                break
+            mesh = mesh.halved()
+            lapped = yield from plain_lap(cycle.run, x, mesh, cycle.valve, cycle.p)
         if not np.isfinite(lapped.states[:, -1]).all():
             raise cycle.no_answer(
                 "the motion stops being finite; check pressure, masses, time constants and effect sizes"
             )
         if lapped.error_m_s.max() <= LOOSE * tolerance:
             break
-        mesh = mesh.refined(lapped.error_m_s, tolerance)
+        least = tolerance if attempt >= _REFINEMENTS else 0.0  # from then on it only gets finer
+        mesh = mesh.refined(np.maximum(lapped.error_m_s, least), tolerance)
     return lapped, mesh
 
 
@@ -201,7 +213,7 @@ class Cycle:
 
     def lap(self, dynamic: np.ndarray, mesh: Mesh) -> Search[Lapped]:
         """Return a lap with its monodromy matrix."""
-        return lap(self.run, self.start(dynamic), mesh, self.valve, self.p)
+        return lap(self.run, self.start(dynamic), mesh, self.valve, self.p, self.scale)
 
     def plain_lap(self, dynamic: np.ndarray, mesh: Mesh) -> Search[Lapped]:
         """Return a lap without derivative."""

@@ -21,6 +21,7 @@ from srs_opt.simulate.together import Search, Stretch, alone
 
 _REFINEMENTS = 3  # of a mesh, coarser here and finer there; after them it only gets finer
 _ATTEMPTS = 12
+_HALVINGS = 5  # of a mesh whose steps are so long that the motion leaves what numbers can hold
 STEP_S = 0.005  # first guess of the step
 LOOSE = 8.0  # a mesh is kept while no step errs by more than this many tolerances
 MANY = 32  # alike pieces integrated in one call
@@ -181,9 +182,17 @@ class Integrator:
 
         Returns states (nx, n), errors (n,), the mesh of each piece and how many pieces were done.
         """
+        halvings = 0
         for attempt in range(_ATTEMPTS):
             repeated = mesh.repeated(many, valve.shape[1])
-            states, errors = yield from self.stepping(x, repeated, np.tile(valve, many), p)
+            try:
+                states, errors = yield from self.stepping(x, repeated, np.tile(valve, many), p)
+            except NoAnswerError:
+                halvings += many == 1
+                if halvings > _HALVINGS:
+                    raise
+                mesh, many = mesh if many > 1 else mesh.halved(), 1
+                continue
             worst = errors.reshape(many, -1).max(axis=1)
             good = int(np.argmax([*(worst > LOOSE * tolerance), True]))
             if good:
