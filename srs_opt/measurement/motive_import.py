@@ -17,10 +17,10 @@ from srs_opt.measurement.ground import ground_axes, to_ground, without_ghosts
 from srs_opt.measurement.labels import follow, take
 from srs_opt.measurement.motive import Take
 from srs_opt.measurement.onset import Gait, find_onset, noise_sd
-from srs_opt.measurement.problem import Report
 from srs_opt.measurement.records import KINDS, Array, Bench, Check, DataSet, Trial
-from srs_opt.measurement.table import Row, read_rows
+from srs_opt.problem import Report
 from srs_opt.robot import Robot
+from srs_opt.table import Row, read_rows
 
 Points = Literal["auto", "markers", "bodies"]
 SETTINGS = ("frequency_hz", "pressure_kpa", "offset", "phase_lag_rad")

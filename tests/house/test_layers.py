@@ -13,6 +13,7 @@ LAYERS = (
     ("srs_opt", "planners", "srs_opt.errors", "srs_opt.processes"),
     ("srs_opt.files", "srs_opt.sweep"),
     ("srs_opt.document", "srs_opt.figures", "srs_opt.command"),
+    ("srs_opt.problem", "srs_opt.table"),
     ("srs_opt.robot", "srs_opt.robots"),
     ("srs_opt.gait", "srs_opt.model"),
     ("srs_opt.simulate",),

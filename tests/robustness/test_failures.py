@@ -92,7 +92,7 @@ CASES = [
     ("srs_opt.drive", ["--speed", "nan"], 2, "expected a finite number"),
     ("srs_opt.drive", ["--speed", "1e308", "--quiet"], 2, "at most 100 m/s"),
     ("srs_opt.drive", ["--speed", "0.1", "--turn-rate", "-1e308", "--quiet"], 2, "at most 1000 rad/s"),
-    ("srs_opt.drive", ["--speed", "0.1", "--map", "{tmp}/map.csv"], 2, "map.csv:1: expected the columns"),
+    ("srs_opt.drive", ["--speed", "0.1", "--map", "{tmp}/map.csv"], 2, "map.csv:1: column 'frequency_hz' is missing"),
     ("srs_opt.measurement", ["{tmp}/absent", "--quiet"], 2, "absent"),
     ("srs_opt.measurement", ["{tmp}/set", "--quiet"], 2, "dataset.yaml"),
     ("srs_opt.import_motive", ["{tmp}/take.csv"], 2, "--trials"),
