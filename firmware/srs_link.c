@@ -81,8 +81,8 @@ static uint8_t take_cycle(srs_device *d, const uint8_t *payload, uint16_t bytes)
 
 static uint8_t carry_out(srs_device *d, uint8_t type, const uint8_t *payload, uint16_t bytes) {
   uint8_t result = (uint8_t)SRS_OK;
-  if ((type == SRS_SELECT) && (bytes == 2u)) {
-    result = (uint8_t)srs_player_select(&d->player, get16(payload));
+  if ((type == SRS_SELECT) && (bytes == 4u)) {
+    result = (uint8_t)srs_player_select(&d->player, get16(payload), get16(payload + 2));
   } else if ((type == SRS_CYCLE) && (bytes > 0u)) {
     result = take_cycle(d, payload, bytes);
   } else if ((type == SRS_RUN) && (bytes == 0u)) {

@@ -141,12 +141,18 @@ static srs_fault not_now(srs_player *p) {
   return (p->state == SRS_VENTING) ? refuse(p, SRS_REFUSED_BUSY) : SRS_OK;
 }
 
-srs_fault srs_player_select(srs_player *p, uint16_t gait) {
+/* Whether a gait may follow a cycle. */
+static uint8_t may_follow(const srs_player *p, uint16_t then) {
+  return (uint8_t)((then == SRS_NONE) || (then < p->program->gait_count));
+}
+
+srs_fault srs_player_select(srs_player *p, uint16_t gait, uint16_t then) {
   const srs_fault why = not_now(p);
   srs_cycle cycle;
   if (why != SRS_OK) { return why; }
-  if (gait >= p->program->gait_count) { return refuse(p, SRS_REFUSED_GAIT); }
+  if ((gait >= p->program->gait_count) || !may_follow(p, then)) { return refuse(p, SRS_REFUSED_GAIT); }
   cycle = cycle_of_gait(p, gait);
+  cycle.then = then;
   p->step = SRS_NONE;
   return accept(p, &cycle, 1u);
 }
@@ -156,9 +162,7 @@ srs_fault srs_player_cycle(srs_player *p, uint16_t then, uint16_t period_ticks, 
   const srs_fault why = not_now(p);
   srs_cycle cycle = {{period_ticks, 0u, count, pressure_pa, 0, 0}, SRS_NONE, then, 0u};
   if (why != SRS_OK) { return why; }
-  if ((count > (uint16_t)SRS_MAX_EVENTS) || ((then != SRS_NONE) && (then >= p->program->gait_count))) {
-    return refuse(p, SRS_REFUSED_CYCLE);
-  }
+  if ((count > (uint16_t)SRS_MAX_EVENTS) || !may_follow(p, then)) { return refuse(p, SRS_REFUSED_CYCLE); }
   /* the slot that is being played stays as it is */
   cycle.slot = ((p->state != SRS_VENTED) && (p->now.index == SRS_NONE)) ? (uint8_t)(1u - p->now.slot) : 0u;
   if ((p->has_pending != 0u) && (p->pending.index == SRS_NONE) && (p->pending.slot == cycle.slot)) {

@@ -94,7 +94,7 @@ typedef struct {
 typedef struct {
   const srs_program *program;
   srs_state state;
-  srs_fault fault; /* the last one; cleared by srs_player_clear() and by every accepted command */
+  srs_fault fault; /* the last one; cleared by every command that is accepted */
   srs_cycle now, pending;
   uint8_t has_pending;
   uint8_t commanded;  /* the timeout is watched */
@@ -118,10 +118,11 @@ void srs_read(void *to, const void *from, uint16_t bytes);
 /* Start vented. Checks the whole program; SRS_FAULT_PROGRAM stays until another program is loaded. */
 srs_fault srs_player_init(srs_player *p, const srs_program *program);
 
-/* Play a gait from the next cycle's end on (at once, after settling, when vented). */
-srs_fault srs_player_select(srs_player *p, uint16_t gait);
+/* Play one cycle of a gait from the next cycle's end on (after settling when vented), then the gait `then`:
+ * the same gait to go on until told otherwise, SRS_NONE to vent unless told otherwise in time. */
+srs_fault srs_player_select(srs_player *p, uint16_t gait, uint16_t then);
 
-/* Play a cycle once from the next cycle's end on, then the gait `then` (SRS_NONE: vent). */
+/* The same for a cycle that is in no program. */
 srs_fault srs_player_cycle(srs_player *p, uint16_t then, uint16_t period_ticks, uint32_t pressure_pa,
                            const srs_event *events, uint16_t count);
 

@@ -14,10 +14,13 @@ import sys
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NoReturn, TypeVar
+from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
 from srs_opt.errors import InputError, NoAnswerError, SrsError
 from srs_opt.files import check_can_write
+
+if TYPE_CHECKING:
+    from srs_opt.robot import Robot
 
 T = TypeVar("T")
 FAULT = 70  # exit status of a bug (EX_SOFTWARE); 0, 1 and 2 are answers
@@ -64,7 +67,9 @@ def make_parser(
             "--robot", type=Path, metavar="FILE", help="robot file (default: the built-in WPI SRS)"
         )
         parser.add_argument(
-            "--model", choices=("complex", "simplified"), default="complex", help="dynamic model"
+            "--model",
+            choices=("complex", "simplified", "compliant"),
+            help="dynamic model (default: compliant where the robot file has a stiffness, else complex)",
         )
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="folder for the files (default: out/<command>)"
@@ -88,6 +93,11 @@ def make_parser(
             "--cluster", metavar="ADDRESS", help="Dask scheduler to send the work to, host:port"
         )
     return parser
+
+
+def chosen_model(options: argparse.Namespace, robot: Robot) -> str:
+    """Return the model that --model names, else the robot's own."""
+    return str(options.model or robot.own_model)
 
 
 def run_command(

@@ -23,6 +23,7 @@ from srs_opt.errors import InputError
 
 EffectSpec = Mapping[str, Any]
 MIN_LINKS, MAX_LINKS = 3, 64
+RELAXATION_S = 0.005  # of silicone, where the robot file says nothing
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,11 @@ class Robot:
         C0 over pressure in the step response (14).
     tau1_s, tau2_s : float
         Time constants of (14).
+    bending_stiffness_n_m2, gap_stiffness_n_m2 : float or None
+        EI of a segment's chamber and of the gap between two; None: rigid (it follows the actuators whatever
+        the load).
+    bending_relaxation_s : float or None
+        Relaxation time of the material (0.005 s where a stiffness is given).
     effects : tuple of dict
         Effects beyond the paper's model, ``{"name": ..., parameter: value, ...}``.
     relative_sd : dict
@@ -71,6 +77,9 @@ class Robot:
     tau1_s: float = 0.08
     tau2_s: float = 0.05
     valve_delay_s: float = 0.0
+    bending_stiffness_n_m2: float | None = None
+    bending_relaxation_s: float | None = None
+    gap_stiffness_n_m2: float | None = None
     effects: tuple[EffectSpec, ...] = ()
     relative_sd: Mapping[str, float] = field(default_factory=dict)
     sources: Mapping[str, str] = field(default_factory=dict)
@@ -95,20 +104,33 @@ class Robot:
         """Curvature at which a segment has bent by 2 pi and would meet itself."""
         return 2 * math.pi / self.segment_length_m
 
+    @property
+    def is_soft(self) -> bool:
+        """Whether the body bends under load."""
+        return self.bending_stiffness_n_m2 is not None or self.gap_stiffness_n_m2 is not None
+
+    @property
+    def own_model(self) -> str:
+        """Name of the dynamic model that takes all that the robot file says."""
+        return "compliant" if self.is_soft else "complex"
+
     def with_values(self, **changes: Any) -> Robot:
-        """Return a validated copy with some fields changed."""
-        record = {**self.to_record(), **changes}
+        """Return a validated copy with some fields changed; None takes a stiffness away."""
+        record = {k: v for k, v in {**self.to_record(), **changes}.items() if v is not None}
         return robot_from_document(Document(f"robot '{self.name}'", _plain(record)))
 
     def to_record(self) -> dict[str, Any]:
         """Return the robot as the mapping that a robot file holds."""
-        return {f.name: _plain(getattr(self, f.name)) for f in dataclasses.fields(self)}
+        record = {f.name: _plain(getattr(self, f.name)) for f in dataclasses.fields(self)}
+        return {key: value for key, value in record.items() if value is not None}
 
     def fingerprint(self) -> str:
         """Return a hash of everything that bears on motion (not name, sources or deviations)."""
         record = self.to_record()
         for key in ("name", "sources", "relative_sd"):
             del record[key]
+        if not self.is_soft:
+            record.pop("bending_relaxation_s", None)
         if self.effects:
             from srs_opt.model.effects import own_definitions
 
@@ -160,6 +182,8 @@ def robot_from_document(document: Document) -> Robot:
         if isinstance(value, (int, float)):
             record[key] = int(value) if key == "links" else float(value)
     robot = Robot(**record)
+    if robot.is_soft and robot.bending_relaxation_s is None:
+        robot = dataclasses.replace(robot, bending_relaxation_s=RELAXATION_S)
     _check_body(document, robot)
     if robot.friction_normal < robot.friction_tangential:
         raise document.error(

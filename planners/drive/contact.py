@@ -64,6 +64,11 @@ class BodyWatch:
         self._end_s += float(time_s[last - 1])
         return arrived is not None
 
+    @property
+    def time_s(self) -> float:
+        """Time so far."""
+        return self._end_s
+
     def record(self) -> tuple[Array, Array, Array]:
         """Return times (n,), poses (n, 3) and centre lines (n, points, 2) of everything looked at."""
         return np.concatenate(self._time), np.concatenate(self._pose), np.concatenate(self._lines)

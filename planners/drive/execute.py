@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from planners.drive.contact import BodyWatch
 from planners.drive.foresight import Foresight
 from planners.drive.halt import halt
-from planners.drive.plant import Plant, SimulatedPlant
+from planners.drive.plant import Plant, PlantStopped, SimulatedPlant
 from planners.drive.track import Choice, Learned, Where, by_plan, choose, nearest_node, reference_of
 from planners.plan.answer import Plan
 from planners.plan.solve import solve_with_lattice
 from planners.search.problem import ROUNDING_M, Problem
-from planners.search.tree import Root
+from planners.search.tree import Root, arrival_index
 from srs_opt.errors import InputError, NoAnswerError
 from srs_opt.model.parameters import valve_delay_s
 from srs_opt.robot import Robot
@@ -33,7 +33,9 @@ MOST_TRIED = 8  # gaits, before a cycle is given up
 MOST_IDLE = 4  # cycles without progress along the plan
 MOST_REPLANS = 8
 MOST_HALTS = 3  # from which the robot sets off again
-REPLAN_CYCLES = 4000  # looked at when planning anew
+REPLAN_CYCLES = 4000  # looked at when planning anew in motion
+REST_CYCLES = 40_000  # and from rest, where there is time
+REPLAN_S, REST_S = 20.0, 60.0
 PATIENCE = 3.0  # times the plan's cycles
 
 
@@ -51,6 +53,10 @@ class Execution:
     replans : int
     gaits : tuple of int
         Played, a cycle each.
+    starts_s : tuple of float
+        When those cycles began.
+    halts : tuple of (start_s, Timeline)
+        What the valves did to come to rest; before the cycle after a halt is rest.
     reason : str
         Why it ended, in words.
     time_s, pose, lines : arrays (n,), (n, 3), (n, points, 2)
@@ -64,6 +70,8 @@ class Execution:
     duration_s: float
     replans: int
     gaits: tuple[int, ...]
+    starts_s: tuple[float, ...]
+    halts: tuple[tuple[float, Timeline], ...]
     reason: str
     time_s: Array
     pose: Array
@@ -117,6 +125,8 @@ class Drive:
         self.learned = Learned()
         self.replans = self.halts = 0
         self.played: list[int] = []
+        self.starts_s: list[float] = []
+        self.halted: list[tuple[float, Timeline]] = []
         self._follow(plan)
         self.most_cycles = 20 + math.ceil(PATIENCE * len(plan.gaits))
 
@@ -130,16 +140,44 @@ class Drive:
         """Drive until something ends it."""
         self.watch.look(np.zeros(1), self.state[None, :3], np.zeros((1, self.problem.robot.segments)))
         while len(self.played) < self.most_cycles:
-            gait = self._next_gait()
-            if gait is None:
-                reason = "no gait keeps the body off the walls and no other way was found"
-                if self.halts == MOST_HALTS or not self._halt() or not self._plan_anew():
-                    return self._stop(reason)
-                continue
-            outcome = self._cycle(gait)
-            if outcome is not None:
-                return self._done(outcome)
+            try:
+                ended = self._advance()
+            except PlantStopped as stopped:
+                ended = None if self._go_on_after(stopped) else self._done(stopped.reason)
+            if ended is not None:
+                return ended
         return self._stop(f"the goal was not reached within {self.most_cycles} cycles")
+
+    def _advance(self) -> Execution | None:
+        """Play one cycle, or halt and look for another way; return the end of the drive if this was it."""
+        at_rest = self.before == self.problem.motion.rest
+        if at_rest and self.played and self._at_goal():
+            return self._done("arrived")  # it rolled out into the goal
+        gait = self._next_gait()
+        if gait is None:
+            reason = "no gait keeps the body off the walls and no other way was found"
+            if self.halts == MOST_HALTS or not self._halt():
+                return self._stop(reason)
+            if self._at_goal():
+                return None
+            self.tell(f"cycle {len(self.played)}: halted, looking for a way from rest")
+            return None if self._plan_anew() else self._stop(reason)
+        outcome = self._cycle(gait)
+        if outcome == "arrived" and not self.plant.waits:
+            self._halt()
+        return None if outcome is None else self._done(outcome)
+
+    def _go_on_after(self, stopped: PlantStopped) -> bool:
+        """Look for another way from where the robot was stopped, if there may be one."""
+        self.state, self.before = self.plant.state, self.problem.motion.rest
+        self.halts += 1
+        self.tell(f"cycle {len(self.played)}: {stopped.reason}")
+        if not stopped.may_go_on or self.halts > MOST_HALTS:
+            return False
+        return self._at_goal() or self._plan_anew()
+
+    def _at_goal(self) -> bool:
+        return arrival_index(self.problem.goal, self.state[None, :3]) is not None
 
     def _next_gait(self) -> int | None:
         choice = self._choice()
@@ -148,6 +186,8 @@ class Drive:
             self.replans += 1
             why = "strayed or stuck" if lost else "nothing fits"
             self.tell(f"cycle {len(self.played)}: {why}, planning anew")
+            if not self.plant.waits and self.before != self.problem.motion.rest:
+                return None  # it cannot be planned in motion: halt first
             if self._plan_anew():
                 choice = self._choice()
         if choice.clearance_m < STOP_CLEARANCE_M:
@@ -184,8 +224,8 @@ class Drive:
 
     def _room_m(self, state: Array, gait: int) -> float:
         """Return the least clearance over a cycle with any friction that the robot may have."""
-        played = self.problem.gaits.gaits[gait].gait
-        return self.foresight.least_room_m(state, Timeline.of_gait(played, played.period_s), 0.0)
+        timeline = self.problem.joints.timeline(self.before, gait)
+        return self.foresight.least_room_m(state, timeline, 0.0)
 
     def _gait_by_plan(self, state: Array) -> int | None:
         """Return the gait that the plan plays next, if the robot is as the plan has it after a cycle."""
@@ -199,14 +239,15 @@ class Drive:
     def _plan_anew(self) -> bool:
         """Look for a way from here; the model takes over place, speed and curvature."""
         # half the margin is asked for on the way, and where the robot is now, no more than it has
+        at_rest = self.before == self.problem.motion.rest
         relaxed = replace(self.problem, margin_m=self.problem.margin_m / 2)
         slack = min(0.0, self.watch.now_m - relaxed.margin_m) - ROUNDING_M
         try:
             result = solve_with_lattice(
                 relaxed,
                 root=Root(self.state, self.before, slack),
-                time_limit_s=20.0,
-                max_nodes=REPLAN_CYCLES,
+                time_limit_s=REST_S if at_rest else REPLAN_S,
+                max_nodes=REST_CYCLES if at_rest else REPLAN_CYCLES,
             )
         except NoAnswerError:
             return False
@@ -219,11 +260,14 @@ class Drive:
         """Play one cycle; return what ended the drive, if anything."""
         gait = self.problem.gaits.gaits[index].gait
         begin, before = self.state[:3].copy(), self.state
-        cycle = Timeline.of_gait(gait, gait.period_s)
-        trajectory = self.plant.play(cycle, index)
+        cycle = self.problem.joints.timeline(self.before, index)
+        plain = self.problem.joints.is_plain(self.before, index)
+        start_s = self.watch.time_s
+        trajectory = self.plant.play(cycle, index if plain else None)
         arrived = self.watch.look(trajectory.time_s, trajectory.pose, trajectory.kappa)
         self.state = self.plant.state
         self.played.append(index)
+        self.starts_s.append(start_s)
         self.before = index
         if self.watch.touched:
             return "contact"
@@ -247,12 +291,17 @@ class Drive:
     def _halt(self) -> bool:
         """Bring the robot to rest where there is room for it; return whether it came to no harm."""
         self.halts += 1
-        trajectory = self.plant.play(halt(self.foresight, self.state), None)
-        self.watch.look(trajectory.time_s, trajectory.pose, trajectory.kappa, ends=False)
+        try:
+            valves = halt(self.foresight, self.state, self.before)
+            self.halted.append((self.watch.time_s, valves))
+            trajectory = self.plant.play(valves, None)
+        except PlantStopped as stopped:  # it vented by itself
+            if not stopped.may_go_on:
+                raise
+        else:
+            self.watch.look(trajectory.time_s, trajectory.pose, trajectory.kappa, ends=False)
         self.state = self.plant.state
         self.before = self.problem.motion.rest
-        if not self.watch.touched:
-            self.tell(f"cycle {len(self.played)}: halted, looking for a way from rest")
         return not self.watch.touched
 
     def _done(self, outcome: str) -> Execution:
@@ -272,6 +321,8 @@ class Drive:
             float(time[-1]) + self.delay_s,
             self.replans,
             tuple(self.played),
+            tuple(self.starts_s),
+            tuple(self.halted),
             reason,
             time,
             pose,

@@ -1,8 +1,8 @@
-"""What room the body will have, simulated with the friction that the driven robot seems to have.
+"""What room the body will have, simulated with the friction and stiffness that the robot seems to have.
 
-Whatever slows a robot down or lets it slide is seen as friction: after every cycle, those frictions stay
-possible that would have led near to where the robot is. What the driver thinks of doing is looked at with all
-of them.
+Whatever slows a robot down or lets it slide is seen as friction, whatever yields as stiffness: after every
+cycle, those suspects stay possible that would have led near to where the robot is. What the driver thinks of
+doing is looked at with all of them.
 """
 
 from __future__ import annotations
@@ -17,13 +17,21 @@ from planners.motion.robots import undelayed, with_friction_times
 from planners.search.problem import Problem
 from srs_opt.errors import NoAnswerError
 from srs_opt.orbit.steady import integrator
-from srs_opt.simulate.integrate import Trajectory
+from srs_opt.robot import Robot
+from srs_opt.simulate.integrate import Integrator, Trajectory
 from srs_opt.simulate.timeline import Timeline
 from srs_opt.simulate.together import together
 
 Array = NDArray[np.float64]
 # friction along and across the wheels, over the planned robot's; a hose that drags is felt along the wheels
 FRICTIONS = ((1.0, 1.0), (0.8, 0.8), (1.2, 1.2), (0.8, 1.0), (1.25, 1.0), (1.5, 1.0), (2.0, 1.0))
+# bending stiffness over the planned one of a soft robot whose file gives no deviation; N m^2 for a rigid plan
+# (a silicone segment of the built-in robot's size has 0.002 to 0.02)
+STIFFNESS_TIMES = (0.5, 2.0)
+STIFFNESSES_N_M2 = (0.0025, 0.005, 0.012)
+# a body that yields though the plan says rigid is suspected only when no friction explains what was seen: it
+# begins with this squared miss. With 0 sound robots are driven as carefully as soft ones
+UNLIKELY = 1.5
 FADING = 0.7  # of what earlier cycles told, per cycle
 # misses of place (m), heading (rad) and speed (m/s) that weigh alike
 SCALES = np.array([0.01, 0.01, 0.05, 0.05])
@@ -33,7 +41,7 @@ ENOUGH_MARGINS = 0.5  # of the margin: what leaves so much room is good enough
 
 
 class Foresight:
-    """Simulates what the driver thinks of doing, with every friction that the true robot may have.
+    """Simulates what the driver thinks of doing, with every friction and stiffness that the robot may have.
 
     Parameters
     ----------
@@ -47,7 +55,15 @@ class Foresight:
             integrator(undelayed(with_friction_times(robot, *friction)), problem.gaits.model)
             for friction in FRICTIONS
         ]
-        self._misses = np.zeros(len(FRICTIONS))
+        self._runs += [integrator(undelayed(suspect), suspect.own_model) for suspect in _yielding(robot)]
+        self._seen = np.zeros(len(self._runs))
+        self._prior = np.zeros(len(self._runs))
+        if not robot.is_soft:
+            self._prior[len(FRICTIONS) :] = UNLIKELY
+
+    @property
+    def _misses(self) -> Array:
+        return self._seen + self._prior
 
     @property
     def enough_m(self) -> float:
@@ -56,23 +72,30 @@ class Foresight:
 
     @property
     def likely(self) -> tuple[float, float]:
-        """The one of FRICTIONS that explains best what was seen."""
-        return FRICTIONS[int(self._misses.argmin())]
+        """The one of FRICTIONS that explains best what was seen; (1, 1) also where a stiffness does."""
+        best = int(self._misses.argmin())
+        return FRICTIONS[best] if best < len(FRICTIONS) else FRICTIONS[0]
 
     def learn(self, before: Array, timeline: Timeline, after: Array) -> None:
         """Take in one cycle: the state it began with and the state it ended with."""
-        foreseen = together([run.travel(timeline, before) for run in self._runs])
+        foreseen = together([run.travel(timeline, self._begun(run, before)) for run in self._runs])
         misses = [_miss(outcome, after) for outcome in foreseen]
-        self._misses = FADING * self._misses + misses
+        self._seen = FADING * self._seen + misses
 
-    def room_m(self, state: Array, timeline: Timeline, friction: int | None = None) -> float:
-        """Return the smallest clearance with the likeliest friction, or another of FRICTIONS.
+    def _begun(self, run: Integrator, state: Array) -> Array:
+        """Return the planned robot's state as a suspect's model has it."""
+        if run.layout == self.problem.run.layout:
+            return state
+        return run.layout.adopt(state, self.problem.run.layout)
+
+    def room_m(self, state: Array, timeline: Timeline, suspect: int | None = None) -> float:
+        """Return the smallest clearance with the likeliest suspect, or another (FRICTIONS come first).
 
         Minus infinity where the model cannot go on.
         """
-        run = self._runs[FRICTIONS.index(self.likely) if friction is None else friction]
+        run = self._runs[int(self._misses.argmin()) if suspect is None else suspect]
         try:
-            trajectory = run.run(timeline, state)
+            trajectory = run.run(timeline, self._begun(run, state))
         except NoAnswerError:
             return -math.inf
         watch = BodyWatch(self.problem, self.problem.robot, run)
@@ -80,15 +103,27 @@ class Foresight:
         return watch.smallest_m
 
     def least_room_m(self, state: Array, timeline: Timeline, worth_m: float = -math.inf) -> float:
-        """Return the smallest clearance with any friction; given up at one that leaves at most `worth_m`."""
+        """Return the smallest clearance with any suspect; given up at one that leaves at most `worth_m`."""
         least_m = math.inf
         possible = self._misses <= PLAUSIBLE + TIMES * self._misses.min()
-        for friction in np.argsort(self._misses, kind="stable"):
-            if possible[friction]:
-                least_m = min(least_m, self.room_m(state, timeline, int(friction)))
+        for suspect in np.argsort(self._misses, kind="stable"):
+            if possible[suspect]:
+                least_m = min(least_m, self.room_m(state, timeline, int(suspect)))
             if least_m <= worth_m:
                 break
         return least_m
+
+
+def _yielding(robot: Robot) -> list[Robot]:
+    """Return robots that are softer or stiffer than the planned one, as far as it may be off."""
+    if not robot.is_soft:
+        return [robot.with_values(bending_stiffness_n_m2=value) for value in STIFFNESSES_N_M2]
+    key = "gap_stiffness_n_m2" if robot.bending_stiffness_n_m2 is None else "bending_stiffness_n_m2"
+    sd = robot.relative_sd.get(key)
+    factors = STIFFNESS_TIMES if sd is None else (1 / (1 + 2 * sd), 1 + 2 * sd)
+    others = [robot.with_values(**{key: times * getattr(robot, key)}) for times in factors]
+    rigid = robot.with_values(bending_stiffness_n_m2=None, gap_stiffness_n_m2=None)
+    return others if sd is not None else [*others, rigid]
 
 
 def _miss(foreseen: Trajectory | NoAnswerError, after: Array) -> float:

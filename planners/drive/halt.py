@@ -14,7 +14,7 @@ from srs_opt.simulate.timeline import Timeline
 COAST_S = 1.5  # watched after the valves have been vented
 
 
-def halt(foresight: Foresight, state: NDArray[np.float64]) -> Timeline:
+def halt(foresight: Foresight, state: NDArray[np.float64], before: int) -> Timeline:
     """Return the valves' timeline that brings the robot to rest farthest from the walls.
 
     Parameters
@@ -22,19 +22,24 @@ def halt(foresight: Foresight, state: NDArray[np.float64]) -> Timeline:
     foresight : Foresight
     state : array
         Of the planned robot's model; forward speed in entry 3.
+    before : int
+        Gait of the cycle that ends now, or rest.
     """
     problem = foresight.problem
-    vent = Timeline.vent(problem.robot.segments, COAST_S, 0.0)
+    joints = problem.joints
+    vent = joints.vent(before, COAST_S)
     best, most_m = vent, foresight.least_room_m(state, vent)
     forward = float(state[3]) > 0
-    brakes = [e.gait for e in problem.gaits.gaits if (e.speed_m_s > 0) != forward]
-    steers = [e.gait for e in problem.gaits.gaits if (e.speed_m_s > 0) == forward]
+    possible = np.flatnonzero(problem.motion.allowed[before])
+    ahead = np.array([entry.speed_m_s > 0 for entry in problem.gaits.gaits]) == forward
+    brakes, steers = possible[~ahead[possible]], possible[ahead[possible]]
     # braking for one cycle, then for two, then steering away: what is looked at last goes farthest
     for gaits, cycles in ((brakes, 1), (brakes, 2), (steers, 1)):
         if most_m >= foresight.enough_m:
             break
-        for gait in gaits:
-            way = Timeline.join([Timeline.of_gait(gait, cycles * gait.period_s), vent])
+        for gait in map(int, gaits):
+            first, more = joints.timeline(before, gait), joints.timeline(gait, gait)
+            way = Timeline.join([first, *[more] * (cycles - 1), joints.vent(gait, COAST_S)])
             room_m = foresight.least_room_m(state, way, most_m)
             if room_m > most_m:
                 best, most_m = way, room_m

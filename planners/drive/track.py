@@ -232,6 +232,7 @@ def _grow(
     offset = _offset(reference, place, speed)
     order = np.argsort(offset, kind="stable")[: 3 * BEAM]
     order = np.union1d(order, _planned(reference, where.pose))  # which nothing may resemble
+    order = order[motion.allowed[where.gait, order]]
     if branch.first is None:
         order = np.setdiff1d(order, list(barred))
     lines = body_in_room(motion.body[where.gait, order, 1::_THIN], pose[order, 1::_THIN])

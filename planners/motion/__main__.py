@@ -32,7 +32,9 @@ def run(options: argparse.Namespace) -> Answer:
     robot = wpi_srs()
     table = load_table(options.gaits, robot) if options.gaits else default_table(robot)
     say(options, f"{len(table.gaits)} gaits of '{table.robot_name}'")
-    transitions = simulate_transitions(robot, table, lambda rows: progress(rows, options, "gaits before"))
+    transitions = simulate_transitions(
+        robot, table, progress=lambda rows: progress(rows, options, "gaits before")
+    )
     path = write_transitions(options.out / f"{table_key(robot, table)}.npz", transitions)
     size = path.stat().st_size
     record = {"file": str(path), "gaits": len(table.gaits), "bytes": size}

@@ -6,6 +6,7 @@ import hashlib
 import io
 import json
 import zipfile
+from dataclasses import astuple
 from importlib import resources
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from planners.motion.transitions import (
     motion_table,
     simulate_transitions,
 )
+from planners.motion.valves import DEFAULT_LIMITS, SETTLE_S, STAIR_S, ValveLimits
 from srs_opt.files import atomic_path
 from srs_opt.gait_opt.table import GaitTable
 from srs_opt.robot import Robot
@@ -29,27 +31,32 @@ SHIPPED = "shipped"
 _POSE_STEP = 1e-4  # m and rad: below the error of interpolation, and finer digits do not compress
 
 
-def table_key(robot: Robot, table: GaitTable) -> str:
+def table_key(robot: Robot, table: GaitTable, limits: ValveLimits = DEFAULT_LIMITS) -> str:
     """Return a hash of everything that the motion table depends on, but for the model's own equations."""
     gaits = [
         (e.gait.period_s, e.gait.pressure_kpa, e.gait.intervals, list(e.displacement)) for e in table.gaits
     ]
-    parts = json.dumps([robot.fingerprint(), table.model, LEVELS, SAMPLES, STEP_S, gaits], sort_keys=True)
+    joints = [*astuple(limits), SETTLE_S, STAIR_S]
+    parts = json.dumps(
+        [robot.fingerprint(), table.model, LEVELS, SAMPLES, STEP_S, joints, gaits], sort_keys=True
+    )
     return hashlib.sha256(parts.encode()).hexdigest()[:16]
 
 
-def load_motion(robot: Robot, table: GaitTable, progress: Progress = iter) -> MotionTable:
+def load_motion(
+    robot: Robot, table: GaitTable, limits: ValveLimits = DEFAULT_LIMITS, progress: Progress = iter
+) -> MotionTable:
     """Return the motion table: shipped, cached, or simulated now (about half a minute) and then cached."""
-    key = table_key(robot, table)
+    key = table_key(robot, table, limits)
     shipped = resources.files("planners.motion") / SHIPPED / f"{key}.npz"
     cached = cache_folder() / f"motion_{key}_{_equations_digest()}.npz"
     transitions = None
     for place in (Path(str(shipped)), cached):
         transitions = transitions or _read(place)
     if transitions is None:
-        transitions = simulate_transitions(robot, table, progress)
+        transitions = simulate_transitions(robot, table, limits, progress)
         write_transitions(cached, transitions)
-    return motion_table(robot, table, transitions)
+    return motion_table(robot, table, transitions, limits)
 
 
 def write_transitions(path: Path, transitions: Transitions) -> Path:

@@ -9,6 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from planners.motion.valves import Joints
+
 SAMPLES = 16  # intervals per cycle at which pose and body are kept
 
 Array = NDArray[np.float64]
@@ -48,6 +50,8 @@ class MotionTable:
     body : array (n + 1, n, SAMPLES + 1, points, 2)
         Centre line over that cycle in the robot's frame, tail to head.
     body_width_m : float
+    joints : Joints
+        How a cycle follows another; where none can, the arrays mean nothing.
     """
 
     names: tuple[str, ...]
@@ -58,6 +62,7 @@ class MotionTable:
     pose: NDArray[np.float32]
     body: NDArray[np.float32]
     body_width_m: float
+    joints: Joints
 
     @property
     def rest(self) -> int:
@@ -95,6 +100,11 @@ class MotionTable:
     def bodies(self, before: int, now: NDArray[np.int64] | slice, pose: Array) -> Array:
         """Return centre lines in the room, (gaits, SAMPLES + 1, points, 2), for poses of the same gaits."""
         return body_in_room(self.body[before, now], pose)
+
+    @cached_property
+    def allowed(self) -> NDArray[np.bool_]:
+        """Whether a gait can follow another (n + 1, n): a cycle that is simulated moves the body."""
+        return np.asarray(self.pose[:, :, 0].any(axis=(2, 3)))
 
     @cached_property
     def course(self) -> Array:

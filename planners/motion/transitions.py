@@ -14,15 +14,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from planners.motion.cycles import CycleRun
 from planners.motion.table import SAMPLES, MotionTable
+from planners.motion.valves import DEFAULT_LIMITS, Joints, ValveLimits
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait_opt.table import GaitTable, TableGait
-from srs_opt.orbit.solve import periodic_actuators
-from srs_opt.orbit.steady import integrator
+from srs_opt.orbit.actuators import periodic_actuators
+from srs_opt.orbit.steady import integrator, steady_gait
 from srs_opt.robot import Robot
 from srs_opt.simulate.integrate import Integrator
-from srs_opt.simulate.mesh import Mesh
-from srs_opt.simulate.rosenbrock import BODY_STATES, VELOCITY
+from srs_opt.simulate.rosenbrock import VELOCITY
 from srs_opt.simulate.shapes import centre_lines
 from srs_opt.simulate.together import Search, together
 
@@ -48,47 +49,28 @@ class Transitions(NamedTuple):
     kappa: NDArray[np.float32]
 
 
-_Outcome = tuple[np.ndarray, np.ndarray, np.ndarray]
+_Outcome = tuple[np.ndarray, np.ndarray]
 
 
-class _Cycle:
-    """One gait, ready to be simulated for a cycle from any state."""
-
-    def __init__(self, run: Integrator, entry: TableGait) -> None:
-        gait = entry.gait
-        durations, self.valve = gait.phases()
-        self.mesh = Mesh.uniform(durations, STEP_S)
-        self.p = run.pack(gait.pressure_kpa, gait.frequency_hz)
-        self.time = np.concatenate([[0.0], np.cumsum(self.mesh.h_s)])
-        self.at = np.linspace(0.0, self.time[-1], SAMPLES + 1)
-        self.run = run
-
-    def __call__(self, state: np.ndarray) -> Search[_Outcome]:
-        """Find, as a search, the last state, poses (SAMPLES + 1, 3) and curvatures (SAMPLES + 1, N-1)."""
-        x = state.copy()
-        x[:3] = 0.0
-        states, _ = yield from self.run.stepping(x, self.mesh, self.valve, self.p)
-        all_states = np.concatenate([x[:, None], states], axis=1)
-        n = self.run.structure.segments
-        wanted = [0, 1, 2, *range(BODY_STATES, BODY_STATES + n)]
-        sampled = np.stack([np.interp(self.at, self.time, all_states[i]) for i in wanted], axis=1)
-        return states[:, -1], sampled[:, :3], sampled[:, 3:]
-
-
-def simulate_transitions(robot: Robot, table: GaitTable, progress: Progress = iter) -> Transitions:
-    """Return what every gait does after every gait.
+def simulate_transitions(
+    robot: Robot, table: GaitTable, limits: ValveLimits = DEFAULT_LIMITS, progress: Progress = iter
+) -> Transitions:
+    """Return what every gait does after every gait, joining cycles and ramps of pressure included.
 
     Parameters
     ----------
     robot : Robot
     table : GaitTable
         Its gaits; their order is that of the motion table. The last row of what comes before is rest.
+    limits : ValveLimits
+        What cannot follow under them is left zero.
     progress : callable
         Wraps the iteration over the gaits that come before.
     """
     run = integrator(robot, table.model)
-    cycles = [_Cycle(run, entry) for entry in table.gaits]
-    n = len(cycles)
+    joints = Joints(table, limits)
+    plain = [CycleRun(run, joints.timeline(k, k), STEP_S) for k in range(len(table.gaits))]
+    n = len(plain)
     levels = _speed_levels(table)
     speed = np.empty((n + 1, LEVELS))
     after = np.empty((n + 1, n, LEVELS))
@@ -96,14 +78,23 @@ def simulate_transitions(robot: Robot, table: GaitTable, progress: Progress = it
     kappa = np.empty((n + 1, n, SAMPLES + 1, robot.segments))
     for before in progress(range(n + 1)):
         ends = (
-            [run.rest()] * LEVELS if before == n else _ends(run, table.gaits[before], cycles[before], levels)
+            [run.rest()] * LEVELS if before == n else _ends(run, table.gaits[before], plain[before], levels)
         )
         speed[before] = [state[VELOCITY][0] for state in ends]
         starts = ends[:1] if before == n else ends
-        outcomes = iter(_all([cycle(start) for cycle in cycles for start in starts]))
-        for now in range(n):
-            for level, (last, *way) in enumerate(islice(outcomes, len(starts))):
-                pose[before, now, level], kappa[before, now] = way
+        after[before], pose[before], kappa[before] = 0.0, 0.0, 0.0
+        following = [now for now in range(n) if joints.joint(before, now) is not None]
+        cycles = [
+            plain[now]
+            if joints.is_plain(before, now)
+            else CycleRun(run, joints.timeline(before, now), STEP_S)
+            for now in following
+        ]
+        outcomes = iter(_all([cycle(_at_origin(start)) for cycle in cycles for start in starts]))
+        for now in following:
+            for level, (last, samples) in enumerate(islice(outcomes, len(starts))):
+                pose[before, now, level] = samples[:, :3]
+                kappa[before, now] = samples[:, run.layout.kappa]
                 after[before, now, level] = last[VELOCITY][0]
     # from rest there is one speed only: equal levels, spaced so that they can be looked up
     speed[n] = np.linspace(-1e-3, 1e-3, LEVELS)
@@ -111,7 +102,9 @@ def simulate_transitions(robot: Robot, table: GaitTable, progress: Progress = it
     return Transitions(speed, *(a.astype(np.float32) for a in (after, pose, kappa)))
 
 
-def motion_table(robot: Robot, table: GaitTable, transitions: Transitions) -> MotionTable:
+def motion_table(
+    robot: Robot, table: GaitTable, transitions: Transitions, limits: ValveLimits = DEFAULT_LIMITS
+) -> MotionTable:
     """Return the table that planners look up."""
     return MotionTable(
         names=tuple(entry.name for entry in table.gaits),
@@ -122,6 +115,7 @@ def motion_table(robot: Robot, table: GaitTable, transitions: Transitions) -> Mo
         pose=transitions.pose,
         body=_bodies(integrator(robot, table.model), transitions.kappa),
         body_width_m=robot.body_width_m,
+        joints=Joints(table, limits),
     )
 
 
@@ -130,17 +124,28 @@ def _speed_levels(table: GaitTable) -> np.ndarray:
     return np.linspace(SPEED_MARGIN * min(0.0, *speeds), SPEED_MARGIN * max(0.0, *speeds), LEVELS)
 
 
-def _ends(run: Integrator, entry: TableGait, cycle: _Cycle, speeds: np.ndarray) -> list[np.ndarray]:
+def _ends(run: Integrator, entry: TableGait, cycle: CycleRun, speeds: np.ndarray) -> list[np.ndarray]:
     """Return the states in which one cycle of a gait ends when begun at different forward speeds."""
-    start = run.rest()
-    start[BODY_STATES:] = periodic_actuators(run, entry.gait, cycle.p)
+    if run.structure.compliant:  # one cycle does not settle the bends: begin with those of the steady gait
+        start = steady_gait(run.robot, entry.gait, run.structure.model).solution.start
+    else:
+        start = run.rest()
+        gait = entry.gait
+        p = run.pack(gait.pressure_kpa, gait.frequency_hz)
+        start[run.layout.actuator] = periodic_actuators(run, gait, p)
     begun = []
     for speed in speeds:
         state = start.copy()
         state[VELOCITY] = speed, 0.0, 0.0
         begun.append(cycle(state))
-    ends = [last for last, *_ in _all(begun)]
+    ends = [last for last, _ in _all(begun)]
     return sorted(ends, key=lambda state: float(state[VELOCITY][0]))
+
+
+def _at_origin(state: np.ndarray) -> np.ndarray:
+    moved = state.copy()
+    moved[:3] = 0.0
+    return moved
 
 
 def _all(searches: list[Search[_Outcome]]) -> list[_Outcome]:

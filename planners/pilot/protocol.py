@@ -157,6 +157,11 @@ def frame(kind: int, seq: int, payload: bytes = b"") -> bytes:
     return bytes(out + bytes([FLAG]))
 
 
+def select_payload(gait: int, then: int | None) -> bytes:
+    """Return the payload of the command to play one cycle of a gait, then the gait `then` (None: vent)."""
+    return struct.pack("<HH", gait, NONE if then is None else then)
+
+
 def cycle_payload(
     then: int | None, period: int, pressure_pa: int, events: Sequence[tuple[int, int]], words: int
 ) -> bytes:

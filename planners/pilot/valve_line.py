@@ -97,9 +97,9 @@ class ValveLine:
         self.hello = answer
         return answer
 
-    def select(self, gait: int) -> Status:
-        """Ask for a gait from the end of the present cycle on."""
-        return self._command(Command.SELECT, gait.to_bytes(2, "little"))
+    def select(self, gait: int, then: int | None) -> Status:
+        """Ask for one cycle of a gait from the end of the present cycle on, then for `then` (None: vent)."""
+        return self._command(Command.SELECT, protocol.select_payload(gait, then))
 
     def cycle(
         self, then: int | None, period: int, pressure_pa: int, events: Sequence[tuple[int, int]], words: int

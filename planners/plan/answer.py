@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from itertools import groupby
 from typing import Any, Literal
@@ -107,7 +108,8 @@ class PlanResult:
         record["planning_s"] = round(self.planning_s, 4)
         record["length_m"] = plan and round(plan.length_m, 5)
         record["duration_s"] = plan and round(plan.duration_s, 5)
-        record["clearance_m"] = plan and round(plan.certificate.clearance_m, 6)
+        record["clearance_m"] = plan and math.floor(1e6 * plan.certificate.clearance_m) / 1e6
+        record["error_bound_m"] = plan and math.ceil(1e7 * plan.certificate.error_m) / 1e7
         record["certified"] = bool(plan and plan.certificate.passed)
         record["margin_m"] = problem.margin_m
         record["cost"] = problem.price

@@ -9,8 +9,9 @@ from planners.maze.maze import Maze
 from planners.maze.placement import check_placement
 from planners.maze.places import RobotSize
 from planners.motion.store import load_motion
+from planners.motion.valves import ValveLimits, playable
 from planners.search.problem import Problem
-from srs_opt.command import progress, say
+from srs_opt.command import chosen_model, progress, say
 from srs_opt.drive.calibration import load_calibration
 from srs_opt.errors import InputError
 from srs_opt.gait_opt.table import GaitTable, load_table
@@ -30,9 +31,13 @@ def problem_from(options: argparse.Namespace) -> Problem:
     if not 0 <= options.margin < robot.length_m:
         raise InputError(f"--margin: expected 0 to {robot.length_m:.3g} m, found {options.margin:g}")
     maze = maze_from(options, robot)
-    gaits = gaits_from(options, robot)
+    limits = ValveLimits(options.min_dwell, options.tick, options.pressure_rate)
+    table = gaits_from(options, robot)
+    gaits = playable(robot, table, limits)
+    if len(gaits.gaits) < len(table.gaits):
+        say(options, f"note: {len(gaits.gaits)} of {len(table.gaits)} gaits keep the valves' limits")
     motion = load_motion(
-        robot, gaits, lambda rows: progress(rows, options, "changes of gait (once per gait table)")
+        robot, gaits, limits, lambda rows: progress(rows, options, "changes of gait (once per gait table)")
     )
     margin_m = options.margin + drive_margin_m(options, gaits)
     return Problem(robot, gaits, motion, maze, margin_m, options.cost)
@@ -74,4 +79,4 @@ def gaits_from(options: argparse.Namespace, robot: Robot) -> GaitTable:
 
     if unsteady := room_effects(robot):
         say(options, f"note: planned without {', '.join(unsteady)}: what depends on the room has no gait")
-    return default_table(robot, options.model, say=lambda text: say(options, text))
+    return default_table(robot, chosen_model(options, robot), say=lambda text: say(options, text))

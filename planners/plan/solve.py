@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from planners.plan.answer import Plan, PlanResult, Status
-from planners.plan.certify import Certificate, certify
+from planners.plan.certify import Certificate, Certifier
 from planners.plan.explain import narrower_than_any_gait
 from planners.search.beam import BeamSearch, BeamSettings
 from planners.search.lattice import LatticeSearch, LatticeSettings
@@ -65,6 +65,7 @@ class LatticeSolver:
         self.began, self.time_limit_s = time.perf_counter(), time_limit_s
         self.judged = root is not None  # widths are judged on the whole way only
         self.begin = root or at_rest(problem)
+        self.certifier = Certifier(problem, self.begin)
         self.counts = {"expanded": 0, "simulated": 0, "certificates": 0}
         self.kept: tuple[int, ...] = ()
         self.attempts, self.refined = 0, False
@@ -89,7 +90,7 @@ class LatticeSolver:
                     return self._answer("infeasible", reason)
                 continue
             gaits = self.kept + outcome
-            certificate = certify(self.problem, gaits, self.begin)
+            certificate = self.certifier.certify(gaits)
             self.counts["certificates"] += 1
             if certificate.passed:
                 return self._answer("solved", None, Plan("lattice", gaits, certificate))

@@ -123,7 +123,7 @@ class BeamSearch:
         move = motion.move(state[0], state[1], state[2], before, state[3])
         left = remaining(problem, move.pose[:, -1], move.speed_m_s)
         order = np.argsort(left + motion.period_s, kind="stable")
-        order = order[left[order] < BLOCKED_S / 2]
+        order = order[(left[order] < BLOCKED_S / 2) & problem.motion.allowed[before, order]]
         offers: list[_Offer] = []
         for gaits in (order[:FIRST_LOOK], order[FIRST_LOOK:]):
             lines = motion_lines(problem, before, move.pose, gaits)
@@ -152,7 +152,9 @@ class BeamSearch:
                 if not batch:
                     break
             self.simulated += len(batch)
-            cycles = self.problem.simulate_all([(self._tree.cycle[o.parent].state, o.gait) for o in batch])
+            tree = self._tree
+            begins = [(tree.cycle[o.parent].state, tree.gait[o.parent], o.gait) for o in batch]
+            cycles = self.problem.simulate_all(begins)
             for offer, cycle in zip(batch, cycles):
                 node = None if cycle is None else self._taken(offer, cycle)
                 if node is not None:

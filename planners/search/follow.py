@@ -44,7 +44,7 @@ def follow(problem: Problem, reference: Reference) -> list[Step] | None:
     for _ in range(10 + int(PATIENCE * reference.left_s[0] / CYCLE_S)):
         where = Where(state[:3], gait, float(state[3]))
         choice = choose(problem, reference, where, Learned(), node)
-        cycle = problem.simulate(state, choice.gait)
+        cycle = problem.simulate(state, gait, choice.gait)
         slack = problem.start_slack_m if not steps else 0.0
         if not problem.body.keeps_margin(cycle.lines, slack):
             return None

@@ -101,7 +101,7 @@ class LatticeSearch:
         """Simulate the most promising proposal; return its node if it is new and clear."""
         _, _, parent, gait, spent = heapq.heappop(self._open)
         self.simulated += 1
-        cycle = self.problem.simulate(self._tree.cycle[parent].state, gait)
+        cycle = self.problem.simulate(self._tree.cycle[parent].state, self._tree.gait[parent], gait)
         key = self._key(cycle, gait)
         if key in self._closed:
             return None
@@ -133,6 +133,7 @@ class LatticeSearch:
         room = problem.body.estimate(lines).min(axis=1)
         left = remaining(problem, move.pose[:, -1], move.speed_m_s)
         possible = (room > problem.margin_m - problem.field.error_m) & (left < BLOCKED_S / 2)
+        possible &= problem.motion.allowed[before]
         air = np.clip(1 - (room - problem.margin_m) / problem.motion.body_width_m, 0.0, 1.0)
         price = problem.tariff.of_cycles(self._gaits, move.pose, room - problem.margin_m)
         spent = self._tree.spent[node] + price

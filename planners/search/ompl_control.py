@@ -133,7 +133,10 @@ def _play(problem: Problem, memory: _Memory, number: int, gait: int) -> int:
     """Simulate a cycle and return its number, -1 when it comes too near to a wall."""
     if number < 0:
         return -1
-    cycle = problem.simulate(memory.cycle[number].state, gait)
+    before = memory.gait[number]
+    if not problem.motion.allowed[before, gait]:
+        return -1
+    cycle = problem.simulate(memory.cycle[number].state, before, gait)
     slack = problem.start_slack_m if number == 0 else SLACK_M
     if not problem.body.keeps_margin(cycle.lines, slack):
         return -1

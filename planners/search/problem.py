@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +12,10 @@ from numpy.typing import NDArray
 from planners.maze.field import DistanceField
 from planners.maze.maze import Maze
 from planners.maze.places import Goal, Pose, RobotSize
+from planners.motion.cycles import CycleRun
 from planners.motion.robots import undelayed
-from planners.motion.table import SAMPLES, MotionTable, body_in_room
+from planners.motion.table import MotionTable, body_in_room
+from planners.motion.valves import Joints
 from planners.search.clearance import BodyClearance
 from planners.search.costmap import CostMap, cost_map
 from planners.search.price import Price, Tariff
@@ -23,8 +24,6 @@ from srs_opt.gait_opt.table import GaitTable
 from srs_opt.orbit.steady import integrator
 from srs_opt.robot import Robot
 from srs_opt.simulate.integrate import Integrator
-from srs_opt.simulate.mesh import Mesh
-from srs_opt.simulate.rosenbrock import BODY_STATES
 from srs_opt.simulate.shapes import centre_lines
 from srs_opt.simulate.together import together
 
@@ -49,19 +48,6 @@ class Cycle:
     state: Array
     pose: Array
     lines: Array
-
-
-class _Plan(NamedTuple):
-    """How a gait's cycle is integrated: mesh, valves (N-1, phases), parameters; and sampled.
-
-    Sample k lies between nodes `low[k]` and the next, at `share[k]` of the way.
-    """
-
-    mesh: Mesh
-    valve: Array
-    p: Array
-    low: NDArray[np.int64]
-    share: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,65 +126,53 @@ class Problem:
         """The dynamic model, without effects that know the room and without the valves' delay."""
         return integrator(undelayed(self.robot), self.gaits.model)
 
+    @property
+    def joints(self) -> Joints:
+        """How the valves play a cycle after another."""
+        return self.motion.joints
+
     @cached_property
-    def _cycles(self) -> list[_Plan]:
-        cycles = []
-        for entry in self.gaits.gaits:
-            durations, valve = entry.gait.phases()
-            mesh = Mesh.uniform(durations, STEP_S)
-            time = np.concatenate([[0.0], np.cumsum(mesh.h_s)])
-            p = self.run.pack(entry.gait.pressure_kpa, entry.gait.frequency_hz)
-            at = np.linspace(0.0, time[-1], SAMPLES + 1)
-            low = np.clip(np.searchsorted(time, at, side="right") - 1, 0, time.size - 2)
-            cycles.append(_Plan(mesh, valve, p, low, (at - time[low]) / mesh.h_s[low]))
-        return cycles
+    def _cycles(self) -> dict[tuple[int, int], CycleRun]:
+        return {}
 
-    def as_planned(self, state: Array) -> Array:
-        """Return another robot's state as the planned robot's model has it: place, speed and curvature."""
-        planned, known = self.run.rest(), BODY_STATES + 2 * self.robot.segments
-        planned[:6] = state[:6]
-        planned[BODY_STATES:known] = state[BODY_STATES:known]
-        return planned
+    def _cycle(self, before: int, gait: int) -> CycleRun:
+        """Return the cycle of a gait after another, made when it is first asked for."""
+        key = (gait, gait) if self.joints.is_plain(before, gait) else (before, gait)
+        if key not in self._cycles:
+            self._cycles[key] = CycleRun(self.run, self.joints.timeline(*key), STEP_S)
+        return self._cycles[key]
 
-    def simulate(self, state: Array, gait: int) -> Cycle:
-        """Return one cycle of a gait from a state of the dynamic model."""
-        (cycle,) = self.simulate_all([(state, gait)])
+    def as_planned(self, state: Array, run: Integrator | None = None) -> Array:
+        """Return another robot's state as the planned robot's model has it: place, speed and curvature.
+
+        `run` is that robot's model; by default one of the planned robot's kind.
+        """
+        return self.run.layout.adopt(state, (run or self.run).layout)
+
+    def simulate(self, state: Array, before: int, gait: int) -> Cycle:
+        """Return one cycle of a gait from a state of the model, after a cycle of another (or rest)."""
+        (cycle,) = self.simulate_all([(state, before, gait)])
         if cycle is None:
             raise NoAnswerError(f"the model cannot go on with gait '{self.gaits.gaits[gait].name}'")
         return cycle
 
-    def simulate_all(self, begins: Sequence[tuple[Array, int]]) -> list[Cycle | None]:
-        """Return one cycle each from several states and gaits, simulated side by side.
+    def simulate_all(self, begins: Sequence[tuple[Array, int, int]]) -> list[Cycle | None]:
+        """Return one cycle each from several states, gaits before and gaits, simulated side by side.
 
         The company makes no difference to a cycle; None stands for one that the model cannot go through.
         """
-        plans = [self._cycles[gait] for _, gait in begins]
-        searches = [
-            self.run.stepping(state, plan.mesh, plan.valve, plan.p) for (state, _), plan in zip(begins, plans)
-        ]
-        found = together(searches)
-        went = [
-            (state, plan, outcome[0])
-            for (state, _), plan, outcome in zip(begins, plans, found)
-            if not isinstance(outcome, NoAnswerError)
-        ]
+        found = together([self._cycle(before, gait)(state) for state, before, gait in begins])
+        went = [outcome for outcome in found if not isinstance(outcome, NoAnswerError)]
         cycles = iter(self._kept(went))
         return [None if isinstance(outcome, NoAnswerError) else next(cycles) for outcome in found]
 
-    def _kept(self, went: list[tuple[Array, _Plan, Array]]) -> list[Cycle]:
-        """Return the cycles that went through states (nx, n) after a state."""
+    def _kept(self, went: list[tuple[Array, Array]]) -> list[Cycle]:
+        """Return the cycles of last states and samples (SAMPLES + 1, nx)."""
         if not went:
             return []
-        samples = np.stack([_sampled(state, plan, states) for state, plan, states in went])
-        curved = samples[..., BODY_STATES : BODY_STATES + self.robot.segments]
+        samples = np.stack([sampled for _, sampled in went])
+        curved = samples[..., self.run.layout.kappa]
         lines = centre_lines(self.run, curved.reshape(-1, curved.shape[-1]))
         pose = samples[..., :3]
         placed = body_in_room(lines.reshape(*curved.shape[:-1], *lines.shape[1:]), pose)
-        return [Cycle(states[:, -1], *kept) for (_, _, states), *kept in zip(went, pose, placed)]
-
-
-def _sampled(state: Array, plan: _Plan, states: Array) -> Array:
-    """Return the samples (SAMPLES + 1, nx) of a cycle through `states` (nx, n) after `state`."""
-    everything = np.concatenate([state[None], states.T])
-    low, share = plan.low, plan.share[:, None]
-    return np.asarray((1 - share) * everything[low] + share * everything[low + 1])
+        return [Cycle(last, *kept) for (last, _), *kept in zip(went, pose, placed)]

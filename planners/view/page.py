@@ -51,12 +51,12 @@ def read_motion(file: Path) -> dict[str, Any]:
 def _check_run(document: Document, place: tuple[str | int, ...], run: dict[str, Any], gaits: int) -> None:
     """Complain of what a schema cannot see and the page would trip over."""
     if not run["cycles"]:
-        raise document.error((*place, "cycles"), "is empty (expected [gait, start] of every cycle)")
+        raise document.error((*place, "cycles"), "is empty (expected [gait, start, joining] of every cycle)")
     for index, cycle in enumerate(run["cycles"]):
-        if not (isinstance(cycle, list) and len(cycle) == 2 and cycle[0] in range(gaits)):
+        if not (isinstance(cycle, list) and len(cycle) == 3 and cycle[0] in range(gaits)):
             raise document.error(
                 (*place, "cycles", index),
-                f"expected [index below {gaits} into gaits, start in s], found {cycle}",
+                f"expected [index below {gaits} into gaits, start in s, joining or null], found {cycle}",
             )
     for key in ("body", "clearance_mm"):
         if len(run[key]) != len(run["centre"]):

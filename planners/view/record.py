@@ -6,6 +6,7 @@ import base64
 import io
 import math
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,8 +23,9 @@ from srs_opt.files import write_text
 if TYPE_CHECKING:
     from planners.drive.execute import Execution
     from srs_opt.gait_opt.table import TableGait
+    from srs_opt.simulate.timeline import Timeline
 
-VERSION = 1
+VERSION = 2
 WALL_GREY, UNKNOWN_GREY = 0x3A, 0xB4
 FRAME_S = 1 / 30
 MOST_FRAMES = 6000
@@ -42,28 +44,73 @@ def save_motion(path: Path, problem: Problem, plan: Plan, execution: Execution |
 def motion_record(problem: Problem, plan: Plan, execution: Execution | None = None) -> dict[str, Any]:
     """Return the JSON object of motion.json (schema: motion.schema.json)."""
     c = plan.certificate
-    runs = [_run("planned", problem, plan.gaits, c.time_s, c.pose, c.lines)]
+    starts_s = np.concatenate([[0.0], np.cumsum(problem.motion.period_s[list(plan.gaits)])[:-1]])
+    rest = problem.motion.rest
+    planned = list(zip((rest, *plan.gaits), plan.gaits, starts_s))
+    runs = [_run("planned", problem, planned, c.time_s, c.pose, c.lines)]
     if execution is not None:
         e = execution
-        runs.append(_run("driven", problem, e.gaits, e.time_s, e.pose, e.lines) | {"outcome": e.reason})
-    used = sorted({gait for run in runs for gait, _ in run["cycles"]})
+        before = [rest, *e.gaits][: len(e.gaits)]
+        for start_s, _ in e.halts:
+            after = int(np.searchsorted(e.starts_s, start_s))
+            if after < len(before):
+                before[after] = rest
+        runs.append(
+            _run("driven", problem, list(zip(before, e.gaits, e.starts_s)), e.time_s, e.pose, e.lines)
+            | {"outcome": e.reason, "halts": [_halt(*halt) for halt in e.halts]}
+        )
+    used = sorted({gait for run in runs for _, gait, _ in run["cycles"]})
+    pairs = {(before, gait) for run in runs for before, gait, _ in run["cycles"]}
+    joining = sorted(pair for pair in pairs if not problem.joints.is_plain(*pair))
     for run in runs:
-        run["cycles"] = [[used.index(gait), start] for gait, start in run["cycles"]]
+        run["cycles"] = [
+            [used.index(gait), start, joining.index((before, gait)) if (before, gait) in joining else None]
+            for before, gait, start in run["cycles"]
+        ]
+    limits = problem.joints.limits
     return {
         "version": VERSION,
         "robot": problem.robot.name,
         "body_width_m": problem.robot.body_width_m,
         "margin_m": problem.margin_m,
-        "maze": _maze(problem.maze),
+        "maze": maze_record(problem.maze),
+        "valves": asdict(limits),
         "gaits": [_gait(problem.gaits.gaits[k]) for k in used],
+        "joining": [_joining(problem, before, gait) for before, gait in joining],
         "runs": runs,
     }
 
 
+def _joining(problem: Problem, before: int, gait: int) -> dict[str, Any]:
+    """Return the cycle with which a gait begins after another (or rest)."""
+    joint = problem.joints.joint(before, gait)
+    assert joint is not None  # it has been played
+    after = None if before == problem.motion.rest else problem.gaits.gaits[before].name
+    record = {"gait": problem.gaits.gaits[gait].name, "after": after, **joint.gait.record()}
+    return record | {"from_kpa": joint.from_kpa, "ramp_s": round(joint.ramp_s, 6)}
+
+
+def _halt(start_s: float, valves: Timeline) -> dict[str, Any]:
+    return {
+        "start_s": round(start_s, 5),
+        "duration_s": np.round(valves.duration_s, 6).tolist(),
+        "valve": valves.valve.astype(int).tolist(),
+        "pressure_kpa": np.round(valves.pressure_kpa, 4).tolist(),
+    }
+
+
 def _run(
-    name: str, problem: Problem, gaits: Sequence[int], time_s: Array, pose: Array, lines: Array
+    name: str,
+    problem: Problem,
+    cycles: Sequence[tuple[int, int, float]],
+    time_s: Array,
+    pose: Array,
+    lines: Array,
 ) -> dict[str, Any]:
-    """Return one motion at even instants: body in tenths of a millimetre, clearance in millimetres."""
+    """Return one motion at even instants: body in tenths of a millimetre, clearance in millimetres.
+
+    Cycles are (gait before, gait, start in s).
+    """
     count = min(MOST_FRAMES, max(2, math.ceil(float(time_s[-1]) / FRAME_S) + 1))
     instants = np.linspace(0.0, float(time_s[-1]), count)
     after = np.searchsorted(time_s, instants).clip(1, len(time_s) - 1)
@@ -73,11 +120,10 @@ def _run(
     body = lines[before] + share[:, None, None] * (lines[after] - lines[before])
     centre = pose[before] + share[:, None] * (pose[after] - pose[before])
     room = clearances(problem, body, SHOWN_CLEARANCE_M).clip(max=SHOWN_CLEARANCE_M)
-    starts = np.concatenate([[0.0], np.cumsum(problem.motion.period_s[list(gaits)])[:-1]])
     return {
         "name": name,
         "duration_s": round(float(time_s[-1]), 5),
-        "cycles": [[int(g), round(float(t), 5)] for g, t in zip(gaits, starts) if t < time_s[-1]],
+        "cycles": [[int(b), int(g), round(float(t), 6)] for b, g, t in cycles if t < time_s[-1]],
         "centre": np.round(1e4 * centre[:, :2]).astype(int).tolist(),
         "body": np.round(1e4 * body).astype(int).reshape(count, -1).tolist(),
         "clearance_mm": np.round(1e3 * room, 2).tolist(),
@@ -87,15 +133,14 @@ def _run(
 def _gait(entry: TableGait) -> dict[str, Any]:
     return {
         "name": entry.name,
-        "period_s": entry.gait.period_s,
-        "pressure_kpa": entry.gait.pressure_kpa,
-        "intervals": [[list(pair) for pair in pairs] for pairs in entry.gait.intervals],
+        **entry.gait.record(),
         "speed_m_s": entry.speed_m_s,
         "turn_rate_rad_s": entry.turn_rate_rad_s,
     }
 
 
-def _maze(maze: Maze) -> dict[str, Any]:
+def maze_record(maze: Maze) -> dict[str, Any]:
+    """Return bounds, wall outlines, cells, start and goal as motion.json holds them."""
     rings = []
     if len(maze.walls):
         inside = maze.walls.union & shapely.box(*maze.bounds)

@@ -12,6 +12,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+RANK = 1e-12  # of the largest eigenvalue of scaled normal equations; below it a direction is unknown
+
 
 @dataclass(frozen=True)
 class TrialGram:
@@ -201,7 +203,7 @@ def solve(total: np.ndarray, chosen: Sequence[int], precision: np.ndarray, offse
     a = total[np.ix_(index, index)] + np.diag(precision[index])
     g = total[index, -1] - precision[index] * offset[index]
     scale = 1 / np.sqrt(np.maximum(np.diag(a), 1e-300))
-    inverse = np.linalg.pinv(a * scale[:, None] * scale, rcond=1e-12, hermitian=True)
+    inverse = np.linalg.pinv(a * scale[:, None] * scale, rcond=RANK, hermitian=True)
     inverse *= scale[:, None] * scale
     step = inverse @ g
     deviance = float(total[-1, -1] + np.sum(precision * offset**2) - g @ step)
@@ -215,28 +217,33 @@ def bounded_solve(
     offset: np.ndarray,
     lower: np.ndarray,
 ) -> Solution:
-    """Minimise as `solve` with steps not below `lower` (K,); the solution covers `chosen`."""
+    """Minimise as `solve` with steps not below `lower` (K,); the solution covers `chosen`.
+
+    Coordinates that end at their bound have no covariance.
+    """
     chosen = list(chosen)
-    held: dict[int, float] = {}
-    free = list(chosen)
-    while True:
-        reduced, shifted = total, offset
-        if held:
-            step = np.zeros(total.shape[0])
-            step[list(held)] = list(held.values())
-            reduced = total.copy()
-            reduced[:, -1] -= total @ step
-            reduced[-1, -1] = total[-1, -1] - 2 * total[-1] @ step + step @ total @ step
-            reduced[-1, :-1] = reduced[:-1, -1]
-            shifted = offset + step[:-1]
-        solution = solve(reduced, free, precision, shifted)
-        low = {k: lower[k] for k, s in zip(free, solution.step) if s < lower[k] - 1e-12}
-        if not low:
-            break
-        held.update(low)
-        free = [k for k in free if k not in held]
-    steps = {**held, **dict(zip(free, solution.step))}
+    solution = solve(total, chosen, precision, offset)
+    bound = lower[chosen]
+    if np.all(solution.step >= bound):
+        return solution
+    from scipy.optimize import lsq_linear
+
+    a = total[np.ix_(chosen, chosen)] + np.diag(precision[chosen])
+    g = total[chosen, -1] - precision[chosen] * offset[chosen]
+    # a = F^T F turns the normal equations back into a least-squares problem, F y = z with F^T z = g. Scaled,
+    # so that the rank is judged alike for all coordinates; directions without information are left out.
+    scale = 1 / np.sqrt(np.maximum(np.diag(a), 1e-300))
+    values, vectors = np.linalg.eigh(a * scale[:, None] * scale)
+    kept = values > RANK * values[-1]
+    root = np.sqrt(values[kept])
+    factor = root[:, None] * vectors[:, kept].T
+    target = (vectors[:, kept].T @ (scale * g)) / root
+    bounds = bound / scale, np.full(len(chosen), np.inf)
+    found = lsq_linear(factor, target, bounds, method="bvls", tol=1e-14)
+    free = [k for k, held in zip(chosen, found.active_mask) if held == 0]
     covariance = np.zeros((len(chosen), len(chosen)))
-    inside = [chosen.index(k) for k in free]
-    covariance[np.ix_(inside, inside)] = solution.covariance
-    return Solution(np.array([steps[k] for k in chosen]), covariance, solution.deviance)
+    inside = np.flatnonzero(found.active_mask == 0)
+    covariance[np.ix_(inside, inside)] = solve(total, free, precision, offset).covariance
+    step = np.maximum(found.x * scale, bound)
+    deviance = float(total[-1, -1] + np.sum(precision * offset**2) - 2 * g @ step + step @ a @ step)
+    return Solution(step, covariance, deviance)

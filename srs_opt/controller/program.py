@@ -8,10 +8,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from srs_opt.errors import InputError
 from srs_opt.gait import Gait
 from srs_opt.gait_opt.table import GaitTable
-from srs_opt.gait_opt.ticks import WORD_BITS, Schedule
+from srs_opt.gait_opt.ticks import WORD_BITS, Schedule, segment_mask
+from srs_opt.simulate.timeline import Timeline
 
 MOST_TICKS = 0xFFFE  # a cycle's ticks are counted in 16 bits
 MOST_GAITS = 0xFFFE
@@ -158,3 +161,18 @@ class Program:
     def ticks(self, time_s: float) -> int:
         """Return a time in ticks, rounded up, within 16 bits."""
         return min(max(0, -int(-time_s / self.tick_s // 1)), 0xFFFE)
+
+
+def events_of(timeline: Timeline, tick_s: float) -> tuple[list[tuple[int, int]], int]:
+    """Return a timeline's valve events (tick, mask) and its length in ticks, each switch at the nearest tick.
+
+    The pressure is not part of it: a cycle has one.
+    """
+    ends = np.round(np.cumsum(timeline.duration_s) / tick_s).astype(int)
+    begins = [0, *map(int, ends[:-1])]
+    events: list[tuple[int, int]] = []
+    for begin, end, states in zip(begins, ends, timeline.valve.T):
+        mask = sum(segment_mask(i, int(state)) for i, state in enumerate(states))
+        if end > begin and (not events or events[-1][1] != mask):
+            events.append((begin, mask))
+    return events, int(ends[-1])

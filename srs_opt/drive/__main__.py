@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from srs_opt.command import Answer, Parser, finite_float, make_parser, run_command, say
+from srs_opt.command import Answer, Parser, chosen_model, finite_float, make_parser, run_command, say
 
 if TYPE_CHECKING:
     from srs_opt.drive.calibration import DriveCalibration
@@ -61,6 +61,7 @@ def run(options: argparse.Namespace) -> Answer:
     if options.radius is not None and options.turn_rate is not None:
         raise InputError("give --radius or --turn-rate, not both")
     robot = load_robot(options.robot)
+    model = chosen_model(options, robot)
     files = []
     if options.map:
         gaits = load_map(options.map)
@@ -69,15 +70,15 @@ def run(options: argparse.Namespace) -> Answer:
             list(np.linspace(1, 2, 5)), (41.0, 48.0, 55.0), list(np.linspace(0, 0.8, 6)), _DEFAULT_LAGS
         )
         gaits = gait_map(
-            robot, options.model, points, jobs=options.jobs, cluster=options.cluster, quiet=options.quiet
+            robot, model, points, jobs=options.jobs, cluster=options.cluster, quiet=options.quiet
         )
         files.append(save_map(gaits, options.out / "map.csv"))
     calibration = NO_CALIBRATION
     if options.measured:
-        calibration = calibrate_drive(robot, options.model, load_measured_map(options.measured))
+        calibration = calibrate_drive(robot, model, load_measured_map(options.measured))
         files.append(save_calibration(calibration, options.out / "drive.json"))
         say(options, calibration_words(calibration, robot.pitch_m / robot.segment_length_m))
-    drive = drive_from_map(robot, options.model, gaits, calibration)
+    drive = drive_from_map(robot, model, gaits, calibration)
     turn_rate = options.turn_rate or 0.0
     if options.radius is not None:
         chosen = drive.gait_for_radius(options.speed, options.radius)

@@ -9,7 +9,7 @@ import sys
 import time
 from typing import Any
 
-from srs_opt.command import Answer, Parser, finite_float, make_parser, run_command, say
+from srs_opt.command import Answer, Parser, chosen_model, finite_float, make_parser, run_command, say
 
 
 def build_parser() -> Parser:
@@ -40,6 +40,7 @@ def run(options: argparse.Namespace) -> Answer:
     from srs_opt.robot import load_robot
 
     robot = load_robot(options.robot)
+    model = chosen_model(options, robot)
     left_out = room_effects(robot)
     if left_out:
         say(
@@ -51,7 +52,7 @@ def run(options: argparse.Namespace) -> Answer:
     started = time.perf_counter()
     unfinished = options.out / "map.unfinished"  # an interrupted map goes on from here
     gaits = gait_map(
-        robot, options.model, points,
+        robot, model, points,
         jobs=options.jobs, cluster=options.cluster, quiet=options.quiet, resume=unfinished,
     )  # fmt: skip
     seconds = time.perf_counter() - started

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from srs_opt.command import (
     Answer,
     Parser,
+    chosen_model,
     finite_float,
     make_parser,
     positive_float,
@@ -102,7 +103,9 @@ def problem_from(options: argparse.Namespace) -> CycleProblem:
         raise InputError(f"--intervals {options.intervals}: at most {MOST_INTERVALS} on-intervals per cycle")
     if options.warm and options.valves == "free":
         raise InputError("--warm goes with --valves wave")
-    return CycleProblem(tuple(robots), options.model, goal, limits_from(options), options.intervals)
+    return CycleProblem(
+        tuple(robots), chosen_model(options, robots[0]), goal, limits_from(options), options.intervals
+    )
 
 
 def limits_from(options: argparse.Namespace) -> Limits:
@@ -181,12 +184,13 @@ def _run_table(options: argparse.Namespace) -> Answer:
     from srs_opt.robot import load_robot
 
     robot = load_robot(options.robot)
+    model = chosen_model(options, robot)
     begun = time.perf_counter()
     limits = limits_from(options)
     unfinished = options.out / "table.unfinished"  # an interrupted table goes on from here
     try:
         table = build_table(
-            robot, options.model, limits, lambda text: say(options, text),
+            robot, model, limits, lambda text: say(options, text),
             jobs=options.jobs, cluster=options.cluster, resume=unfinished,
         )  # fmt: skip
     except KeyboardInterrupt:
@@ -201,7 +205,7 @@ def _run_table(options: argparse.Namespace) -> Answer:
         *draw_pareto(table, options.out / "pareto"),
     ]
     if limits == Limits(pressure_kpa=TABLE_PRESSURE_KPA):  # then `plan` may take it without being told
-        files.append(save_table(table, cached_table_path(robot, options.model)))
+        files.append(save_table(table, cached_table_path(robot, model)))
     shutil.rmtree(unfinished, ignore_errors=True)
     best = max(g.speed_m_s for g in table.gaits)
     radii = [abs(g.radius_m) for g in table.gaits if g.radius_m is not None]

@@ -7,6 +7,7 @@ from importlib import resources
 from pathlib import Path
 
 from srs_opt.errors import InputError
+from srs_opt.gait_opt.replayed import replayed
 from srs_opt.gait_opt.table import GaitTable, load_table, save_table
 from srs_opt.robot import Robot, wpi_srs
 
@@ -44,8 +45,12 @@ def default_table(
             return load_table(path, robot)
         except InputError:  # an old version or a damaged file: build it again
             path.unlink(missing_ok=True)
-    from srs_opt.gait_opt.family import build_table
+    if model == "compliant":
+        rigid = robot.with_values(bending_stiffness_n_m2=None, gap_stiffness_n_m2=None)
+        table = replayed(robot, default_table(rigid, say=say), model)
+    else:
+        from srs_opt.gait_opt.family import build_table
 
-    table = build_table(robot, model, say=say or (lambda text: None))
+        table = build_table(robot, model, say=say or (lambda text: None))
     save_table(table, path)
     return table

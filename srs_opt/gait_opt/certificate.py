@@ -11,9 +11,12 @@ from srs_opt.gait import Gait
 from srs_opt.gait_opt.collocation.problem import CycleProblem
 from srs_opt.gait_opt.goal import Goal, Limits
 from srs_opt.model.effects import all_effects
+from srs_opt.orbit.attractors import other_orbits
 from srs_opt.orbit.steady import Orbit, body_over_cycle, integrator, steady_gait
 from srs_opt.robot import Robot
-from srs_opt.simulate.rosenbrock import BODY_STATES, VELOCITY
+from srs_opt.simulate.integrate import Integrator
+from srs_opt.simulate.rosenbrock import VELOCITY
+from srs_opt.simulate.run import motion_of_cycle
 from srs_opt.simulate.timeline import Timeline
 
 CYCLES = 50
@@ -21,6 +24,7 @@ SPEED_ERROR = 0.005  # collocation against simulation
 SPEED_FLOOR_M_S = 5e-4  # of that difference, for gaits that hardly move
 GAP = 1e-3  # change of the motion over CYCLES cycles, over its size
 TURN_ERROR = 0.02
+STANDING_START = 0.01  # speed of the last of CYCLES cycles from rest against the steady one
 LIMIT_EXCESS = 0.01
 _STRAIGHT_RAD_S = 0.02
 
@@ -38,6 +42,10 @@ class Certificate:
         Change of velocity and shape over 50 simulated cycles, over their size.
     largest_floquet_multiplier : float
         Of shape and body velocity, pose removed.
+    standing_start_m_s : float
+        Mean speed over the last of 50 cycles from rest.
+    other_orbits_m_s : tuple of float
+        Speeds of other stable orbits of the same gait, found from rolling starts (soft bodies can have some).
     dwell_ok : bool
     switches_per_s : float
     failures : tuple of str
@@ -48,6 +56,8 @@ class Certificate:
     relative_error: float
     periodicity_gap: float
     largest_floquet_multiplier: float
+    standing_start_m_s: float
+    other_orbits_m_s: tuple[float, ...]
     dwell_ok: bool
     switches_per_s: float
     failures: tuple[str, ...] = field(default=())
@@ -64,6 +74,8 @@ class Certificate:
             "relative_error": self.relative_error,
             "periodicity_gap": self.periodicity_gap,
             "largest_floquet_multiplier": self.largest_floquet_multiplier,
+            "standing_start_m_s": self.standing_start_m_s,
+            "other_orbits_m_s": list(self.other_orbits_m_s),
             "dwell_ok": self.dwell_ok,
             "switches_per_s": self.switches_per_s,
             "passed": self.passed,
@@ -79,6 +91,8 @@ def certify(problem: CycleProblem, gait: Gait, claimed_m_s: float) -> tuple[Cert
     error = abs(claimed_m_s - speed) / max(abs(speed), 1e-9)
     gap = periodicity_gap(robot, gait, problem.model, orbit)
     largest = max(o.largest_multiplier for o in orbits)
+    standing = standing_start(robot, gait, problem.model)
+    others = other_orbits(robot, orbit, problem.model)
     dwell = gait.shortest_dwell_s()
     dwell_ok = dwell >= problem.limits.min_dwell_s - 1e-9
     failures = []
@@ -86,6 +100,10 @@ def certify(problem: CycleProblem, gait: Gait, claimed_m_s: float) -> tuple[Cert
         failures.append(f"simulated speed {speed:.4f} m/s, the optimizer's {claimed_m_s:.4f} m/s")
     if gap > GAP:
         failures.append(f"after {CYCLES} cycles the motion has changed by {gap:.2g} of its size")
+    if abs(standing - speed) > max(STANDING_START * abs(speed), SPEED_FLOOR_M_S):
+        failures.append(
+            f"{CYCLES} cycles from rest end at {standing:.4f} m/s, the steady gait has {speed:.4f}"
+        )
     if largest >= 1:
         failures.append(f"the gait is unstable: largest Floquet multiplier {largest:.3f}")
     if not dwell_ok:
@@ -95,23 +113,44 @@ def certify(problem: CycleProblem, gait: Gait, claimed_m_s: float) -> tuple[Cert
     for r, o in zip(problem.robots, orbits):
         if (room := self_clearance_m(r, o, problem.model)) < 0:
             failures.append(f"the body of robot '{r.name}' overlaps itself by {-1e3 * room:.1f} mm")
-    certificate = Certificate(speed, error, gap, largest, dwell_ok, gait.switches_per_s, tuple(failures))
+    certificate = Certificate(
+        speed,
+        error,
+        gap,
+        largest,
+        standing,
+        tuple(o.speed_m_s for o in others),
+        dwell_ok,
+        gait.switches_per_s,
+        tuple(failures),
+    )
     return certificate, orbits
+
+
+def standing_start(robot: Robot, gait: Gait, model: str, cycles: int = CYCLES) -> float:
+    """Return the mean speed (m/s) over the last of `cycles` cycles from rest."""
+    run = _undelayed(robot, model)
+    path = run.run(Timeline.of_gait(gait, cycles * gait.period_s), run.rest())
+    return motion_of_cycle(run, path, gait, cycles - 1).speed_m_s
+
+
+def _undelayed(robot: Robot, model: str) -> Integrator:
+    """Return the robot's integrator without delays: they shift the whole cycle in time, nothing else."""
+    own = tuple(e for e in robot.effects if all_effects()[e["name"]].delay is None)
+    return integrator(replace(robot, valve_delay_s=0.0, effects=own), model)
 
 
 def periodicity_gap(robot: Robot, gait: Gait, model: str, orbit: Orbit, cycles: int = CYCLES) -> float:
     """Return by how much velocity and shape change over simulated cycles, relative to their size."""
-    # delays shift the whole cycle in time; here it runs as the valves follow it
-    own = tuple(e for e in robot.effects if all_effects()[e["name"]].delay is None)
     start = orbit.solution.start
-    run = integrator(replace(robot, valve_delay_s=0.0, effects=own), model)
+    run = _undelayed(robot, model)
     x = run.run(Timeline.of_gait(gait, cycles * gait.period_s), start).final
     change = np.abs(x - start)
     speeds = orbit.solution.states[VELOCITY]
     momentum = np.abs(speeds[2]).max() or 1.0
     size = max(np.abs(speeds[:2]).max(), 1e-6)
     body = max(change[3], change[4]) / size, change[5] / momentum
-    shape = change[BODY_STATES : BODY_STATES + robot.segments].max() / max(np.abs(orbit.kappa).max(), 1e-9)
+    shape = change[run.layout.kappa].max() / max(np.abs(orbit.kappa).max(), 1e-9)
     return float(max(*body, shape))
 
 
@@ -154,7 +193,7 @@ def _wishes_missed(goal: Goal, orbit: Orbit) -> list[str]:
     return missed
 
 
-def self_clearance_m(robot: Robot, orbit: Orbit, model: str = "complex") -> float:
+def self_clearance_m(robot: Robot, orbit: Orbit, model: str | None = None) -> float:
     """Return the room between parts of the body that are not neighbours, over a cycle (negative: overlap)."""
     run = integrator(robot, model)
     _, _, x, y = body_over_cycle(run, orbit.time_s, orbit.pose, orbit.kappa)

@@ -100,8 +100,15 @@ def summary(answer: dict[str, Any]) -> str:
         f"{100 * certificate['relative_error']:.2f} %, "
         f"gap after 50 cycles {certificate['periodicity_gap']:.1e}, "
         f"largest Floquet multiplier {certificate['largest_floquet_multiplier']:.2f}",
+        *_others(certificate),
     ]
     lines += [f"  {failure}" for failure in certificate["failures"]]
     if answer["interrupted"]:
         lines.append("  interrupted: this is the best gait found until then")
     return "\n".join(lines)
+
+
+def _others(certificate: dict[str, Any]) -> list[str]:
+    """Say that the speed depends on how the gait is begun, where it does."""
+    speeds = ", ".join(f"{speed:.4f}" for speed in certificate["other_orbits_m_s"])
+    return [f"  from rest; begun while rolling this gait can also run at {speeds} m/s"] if speeds else []

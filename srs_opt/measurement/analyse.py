@@ -8,16 +8,20 @@ import math
 from pathlib import Path
 from typing import IO, Any
 
-from srs_opt.errors import SrsError
+from srs_opt.errors import NoAnswerError, SrsError
 from srs_opt.files import write_json, write_with
 from srs_opt.measurement.actuator_bench import combine_steps
 from srs_opt.measurement.bench_files import MAP_COLUMNS
+from srs_opt.measurement.bending import BendingFit, bench_robot, fit_bending
 from srs_opt.measurement.checks import compare_checks
 from srs_opt.measurement.motion import Motion, motion_map, trial_motion
 from srs_opt.measurement.records import DataSet
 from srs_opt.measurement.spring_car import breakaway_friction
 from srs_opt.measurement.steps import fit_steps
 from srs_opt.measurement.tow import analyse_tow
+from srs_opt.robot import save_robot
+
+DOUBTFUL = 2.0  # times the expected squared residuals of the steps on the ground
 
 
 def analyse(dataset: DataSet) -> dict[str, Any]:
@@ -44,6 +48,12 @@ def analyse(dataset: DataSet) -> dict[str, Any]:
         record["breakaway_friction"] = {k: dataclasses.asdict(v) for k, v in friction.items()}
     if bench.steps:
         record["actuator"] = dataclasses.asdict(combine_steps(fit_steps(bench.steps)))
+        try:
+            bending = fit_bending(bench.steps, robot)
+        except NoAnswerError as error:
+            skipped["bending"] = str(error)
+        else:
+            record |= {"bending": dataclasses.asdict(bending)} if bending else {}
     if bench.tow:
         record["tow"] = dataclasses.asdict(analyse_tow(bench.tow, robot))
     if bench.checks:
@@ -52,10 +62,13 @@ def analyse(dataset: DataSet) -> dict[str, Any]:
 
 
 def write_analysis(dataset: DataSet, record: dict[str, Any], folder: Path) -> tuple[Path, ...]:
-    """Write analysis.json, map.csv and pictures into `folder`; return the files."""
+    """Write analysis.json, map.csv, pictures and, from step tests, robot.yaml; return the files."""
     files = [write_json(folder / "analysis.json", record)]
     if record["map"]:
         files.append(write_with(folder / "map.csv", lambda stream: _write_map(stream, record["map"])))
+    if "bending" in record:
+        actuator, bending = combine_steps(fit_steps(dataset.bench.steps)), BendingFit(**record["bending"])
+        files.append(save_robot(bench_robot(dataset.robot, actuator, bending), folder / "robot.yaml"))
     return (*files, *_pictures(dataset, record, folder))
 
 
@@ -109,7 +122,20 @@ def describe(record: dict[str, Any]) -> str:
         lines.append(
             f"  C0 over pressure, {curvature['condition']}: {slope['value']:.4f} ± {slope['sd']:.4f} 1/m/kPa"
         )
+    if "bending" in record:
+        lines.append(f"  {_bending_words(BendingFit(**record['bending']))}")
     return "\n".join(lines)
+
+
+def _bending_words(bending: BendingFit) -> str:
+    if bending.stiffness_n_m2 is None or bending.relative_sd is None:
+        words = f"bending stiffness above {bending.stiffer_than_n_m2:.2g} N m^2: as good as rigid"
+    else:
+        words = f"bending stiffness {bending.stiffness_n_m2:.4g} N m^2 ± {100 * bending.relative_sd:.1f} %"
+    words += f" ({bending.pairs} steps on the ground against their lifted twins)"
+    if bending.misfit > DOUBTFUL:
+        words += f"; these differ by more than friction explains (misfit {bending.misfit:.1f})"
+    return words
 
 
 def _with(interval: dict[str, float | None]) -> str:

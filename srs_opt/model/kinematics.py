@@ -85,7 +85,7 @@ def _sinc_and_slope(h: ca.SX, cos: ca.SX, sin: ca.SX) -> tuple[ca.SX, ca.SX]:
     return value, ca.if_else(small, h * _polynomial(_SLOPE, h * h), (cos - value) * inverse)
 
 
-def _chord(
+def segment_chord(
     kappa: ca.SX, segment_length: ca.SX, gap_length: ca.SX, gap_ratio: ca.SX | float
 ) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
     """Return a segment's chord from link to link, its derivative by kappa, and cos, sin of half its turn.
@@ -142,7 +142,7 @@ def body_frame_chain(
     x, y, x_rate, y_rate = ([ca.SX(0)] for _ in range(4))
     cosines, sines = [c], [s]
     for i in range(kappa.shape[0]):
-        chord, slope, c_half, s_half = _chord(kappa[i], segment_length, gap_length, gap_ratio)
+        chord, slope, c_half, s_half = segment_chord(kappa[i], segment_length, gap_length, gap_ratio)
         # two half turns by complex products: no further cosine along the chain
         c, s = c * c_half - s * s_half, s * c_half + c * s_half
         middle_rate = (angle_rate[i] + angle_rate[i + 1]) / 2

@@ -84,15 +84,27 @@ class Mechanics(ABC):
         return Chain(u_x - yaw_rate * c.y + d.x, u_y + yaw_rate * c.x + d.y, yaw_rate + d.angle)
 
     def forces(self, pose: ca.SX, u_x: ca.SX, u_y: ca.SX, yaw_rate: ca.SX) -> Forces:
-        """Return the forces on the links for a pose and a body velocity.
+        """Return the forces on the links, in the robot's frame, for a pose and a body velocity."""
+        c, s = ca.cos(pose[2]), ca.sin(pose[2])
+        chain = self.chain
+        room_x = pose[0] + c * chain.x - s * chain.y
+        room_y = pose[1] + s * chain.x + c * chain.y
+        v = self.link_velocities(u_x, u_y, yaw_rate)
+        return self.forces_on_links(v, chain.cos, chain.sin, room_x, room_y, pose[2])
+
+    def forces_on_links(
+        self, v: Chain, cos: ca.SX, sin: ca.SX, room_x: ca.SX, room_y: ca.SX, frame_heading: ca.SX
+    ) -> Forces:
+        """Return the forces on links that move at `v`, in any frame that stands at `frame_heading`.
 
         Friction on link i is -(normal force) [mu_t d_t t + mu_n d_n n] in wheel axes, with the
         smoothed sliding directions d of the robot's friction law (paper, Fig. 2 and Table 1).
+        `cos`, `sin` are those of the links' headings in the frame, `room_x`, `room_y` their places in
+        the room (effects of the room ask for them), (N, 1) each.
         """
         p, n = self.parameters, self.links
-        v = self.link_velocities(u_x, u_y, yaw_rate)
         normal = self.mass * p["gravity_m_s2"]
-        c, s = self.chain.cos, self.chain.sin
+        c, s = cos, sin
         for effect, e in p.effects:
             normal = normal + effect.extra_load(e, n) if effect.extra_load else normal
             if effect.wheel_angle:
@@ -109,24 +121,21 @@ class Mechanics(ABC):
             f_t = f_t + effect.rolling_force(e, v_t) if effect.rolling_force else f_t
         friction_power = -(ca.dot(f_t, v_t) + ca.dot(f_n, v_n))
         x, y = c * f_t - s * f_n, s * f_t + c * f_n
-        for fx, fy in self._link_forces(pose, v):
-            x, y = x + fx, y + fy
-        return Forces(x, y, friction_power, ca.dot(x, v.x) + ca.dot(y, v.y))
-
-    def _link_forces(self, pose: ca.SX, v: Chain) -> list[tuple[ca.SX, ca.SX]]:
-        p = self.parameters
-        c, s = ca.cos(pose[2]), ca.sin(pose[2])
         state = LinkState(
-            room_x=pose[0] + c * self.chain.x - s * self.chain.y,
-            room_y=pose[1] + s * self.chain.x + c * self.chain.y,
-            heading=pose[2],
+            room_x=room_x,
+            room_y=room_y,
+            heading=frame_heading,
             v_x=v.x,
             v_y=v.y,
             mass=self.mass,
             gravity=p["gravity_m_s2"],
             friction_speed=p["friction_speed_m_s"],
         )
-        return [effect.link_force(e, state) for effect, e in p.effects if effect.link_force]
+        for effect, e in p.effects:
+            if effect.link_force:
+                fx, fy = effect.link_force(e, state)
+                x, y = x + fx, y + fy
+        return Forces(x, y, friction_power, ca.dot(x, v.x) + ca.dot(y, v.y))
 
     def pose_rate(self, pose: ca.SX, velocity: ca.SX) -> ca.SX:
         """Return (x', y', psi') for the body velocity (u_x, u_y, yaw momentum)."""

@@ -10,7 +10,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from srs_opt.errors import UnsupportedEffectError
+from srs_opt.errors import InputError, UnsupportedEffectError
 from srs_opt.model.effects import all_effects
 from srs_opt.model.effects.effect import Effect
 from srs_opt.robot import Robot
@@ -28,6 +28,8 @@ ROBOT_PARAMETERS = (
     "tau1_s",
     "tau2_s",
 )
+COMPLIANCE_PARAMETERS = ("bending_stiffness_n_m2", "bending_relaxation_s", "gap_stiffness_n_m2")
+_RIGID_N_M2 = 1e15  # what is absent: below rounding beside any stiffness, and with finite derivatives
 GAIT_PARAMETERS = ("pressure_kpa", "frequency_hz")
 
 
@@ -45,13 +47,35 @@ class Structure:
     effects: tuple[str, ...] = ()
 
     @staticmethod
-    def of(robot: Robot, model: str = "complex", *, room: bool = True) -> Structure:
+    def of(robot: Robot, model: str | None = None, *, room: bool = True) -> Structure:
         """Return the structure of `robot` without effects of zero size.
 
-        ``room=False`` leaves out effects that know the room.
+        Without `model` the robot's own is taken (`Robot.own_model`). ``room=False`` leaves out effects that
+        know the room.
+
+        Raises
+        ------
+        InputError
+            If the compliant model is asked for a robot without a stiffness.
         """
         names = tuple(str(e["name"]) for e in dynamic_effects(robot, room=room) if _present(e))
-        return Structure(model, robot.links, robot.friction_law, names)
+        structure = Structure(model or robot.own_model, robot.links, robot.friction_law, names)
+        if structure.compliant and not robot.is_soft:
+            raise InputError(
+                f"robot '{robot.name}' is rigid: the compliant model needs bending_stiffness_n_m2 or "
+                "gap_stiffness_n_m2 in the robot file (a silicone segment of this size has 0.002 to 0.02)"
+            )
+        return structure
+
+    @property
+    def compliant(self) -> bool:
+        """Whether the bends are coordinates of their own."""
+        return self.model == "compliant"
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Names of the parameters, those of effects apart."""
+        return (*ROBOT_PARAMETERS, *(COMPLIANCE_PARAMETERS if self.compliant else ()), *GAIT_PARAMETERS)
 
     @property
     def segments(self) -> int:
@@ -108,7 +132,7 @@ class Parameters:
 
     def __init__(self, structure: Structure) -> None:
         self.structure = structure
-        symbols: dict[str, ca.SX] = {n: ca.SX.sym(n) for n in (*ROBOT_PARAMETERS, *GAIT_PARAMETERS)}
+        symbols: dict[str, ca.SX] = {n: ca.SX.sym(n) for n in structure.parameter_names}
         self.effects: list[tuple[Effect, dict[str, ca.SX]]] = []
         for index, name in enumerate(structure.effects):
             effect = all_effects().get(name)
@@ -138,6 +162,9 @@ class Parameters:
     def pack(self, robot: Robot, pressure_kpa: float, frequency_hz: float) -> np.ndarray:
         """Return the numbers for `robot` under one pressure and frequency, shape (n,)."""
         values: list[float] = [float(getattr(robot, name)) for name in ROBOT_PARAMETERS]
+        if self.structure.compliant:
+            given = (getattr(robot, name) for name in COMPLIANCE_PARAMETERS)
+            values += [_RIGID_N_M2 if value is None else value for value in given]
         values += [pressure_kpa, frequency_hz]
         specs = dynamic_effects(robot, room=True)
         wanted = [s for s in specs if s["name"] in self.structure.effects]

@@ -8,11 +8,17 @@ from srs_opt.document import unknown_word
 from srs_opt.errors import InputError
 from srs_opt.model.actuator import Actuator
 from srs_opt.model.complex import ComplexModel
+from srs_opt.model.compliant import CompliantModel
 from srs_opt.model.mechanics import Mechanics
 from srs_opt.model.parameters import Parameters, Structure
 from srs_opt.model.simplified import SimplifiedModel
+from srs_opt.model.state import StateLayout
 
-MODELS: dict[str, type[Mechanics]] = {"complex": ComplexModel, "simplified": SimplifiedModel}
+MODELS: dict[str, type[Mechanics]] = {
+    "complex": ComplexModel,
+    "simplified": SimplifiedModel,
+    "compliant": CompliantModel,
+}
 
 
 @lru_cache(maxsize=64)
@@ -28,3 +34,8 @@ def build(structure: Structure) -> tuple[Parameters, Mechanics, Actuator]:
         raise InputError(unknown_word("model", structure.model, sorted(MODELS)))
     parameters = Parameters(structure)
     return parameters, MODELS[structure.model](parameters), Actuator(parameters)
+
+
+def state_layout(structure: Structure) -> StateLayout:
+    """Return where things stand in the state of one structure."""
+    return StateLayout(structure.segments, structure.compliant, build(structure)[2].states)

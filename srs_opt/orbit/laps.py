@@ -1,7 +1,12 @@
-"""One lap of a gait, with the derivative of the body's velocity at its end by that at its start."""
+"""One lap of a gait, with the derivative of what it repeats at its end by that at its start.
+
+What a gait repeats are the dynamic states (`StateLayout.dynamic`): the body's velocity, and in the compliant
+model the bends and their rates.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -9,11 +14,11 @@ import casadi as ca
 import numpy as np
 
 from srs_opt.model.parameters import Structure
-from srs_opt.model.registry import build
+from srs_opt.model.registry import build, state_layout
 from srs_opt.simulate.integrate import Integrator, step_kernel
-from srs_opt.simulate.kernel import Kernel
+from srs_opt.simulate.kernel import LANES, Course, Kernel
 from srs_opt.simulate.mesh import Mesh
-from srs_opt.simulate.rosenbrock import BODY_STATES, VELOCITY, step_function
+from srs_opt.simulate.rosenbrock import VELOCITY, step_function
 from srs_opt.simulate.together import Search, Stretch
 
 
@@ -26,32 +31,58 @@ class Lapped:
     states : array (nx, n)
         After each step.
     error_m_s : array (n,)
-    monodromy : array (3, 3)
-        Derivative of the velocity at the end by that at the start.
+    dynamic : array (d,)
+        Dynamic states at the end.
+    monodromy : array (d, d)
+        Derivative of the dynamic states at the end by those at the start.
     """
 
     states: np.ndarray
     error_m_s: np.ndarray
+    dynamic: np.ndarray
     monodromy: np.ndarray
-
-    @property
-    def velocity(self) -> np.ndarray:
-        """Body velocity at the end, (3,)."""
-        return self.states[VELOCITY, -1]
 
 
 def lap(run: Integrator, x: np.ndarray, mesh: Mesh, valve: np.ndarray, p: np.ndarray) -> Search[Lapped]:
     """Integrate over `mesh` with `valve` (N-1, phases) held, from state `x` (nx,)."""
+    dynamic = run.layout.dynamic
+    if run.structure.compliant:  # many columns: as tangents, a few in each call of the compiled code
+        directions = np.eye(run.states)[dynamic]
+        states, errors, tangents = _tangents(run.structure, x, mesh, valve, p, directions)
+        return Lapped(states, errors, states[dynamic, -1], tangents[:, dynamic].T)
     kernel = monodromy_kernel(run.structure)
     got = yield Stretch(kernel, np.concatenate([x, np.eye(3).ravel()]), mesh, valve, p)
     monodromy = got.states[run.states :, -1].reshape(3, 3, order="F")
-    return Lapped(got.states[: run.states], got.error_m_s, monodromy)
+    states = got.states[: run.states]
+    return Lapped(states, got.error_m_s, states[dynamic, -1], monodromy)
 
 
 def plain_lap(run: Integrator, x: np.ndarray, mesh: Mesh, valve: np.ndarray, p: np.ndarray) -> Search[Lapped]:
     """Integrate as `lap` does, faster, without the derivative (not-a-number)."""
     got = yield Stretch(step_kernel(run.structure), x, mesh, valve, p)
-    return Lapped(got.states, got.error_m_s, np.full((3, 3), np.nan))
+    dynamic = run.layout.dynamic
+    unknown = np.full((len(dynamic), len(dynamic)), np.nan)
+    return Lapped(got.states, got.error_m_s, got.states[dynamic, -1], unknown)
+
+
+def _tangents(
+    structure: Structure, x: np.ndarray, mesh: Mesh, valve: np.ndarray, p: np.ndarray, directions: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return states (nx, n), errors (n,) and the last tangents (directions, nx)."""
+    nx, kernel = x.size, tangent_kernel(structure)
+    inputs = np.column_stack([valve.T[mesh.phase], np.zeros(mesh.h_s.size)])
+    still = np.r_[p, np.zeros(p.size)]
+    ends = []
+    for group in _groups(directions):
+        courses = [Course(np.r_[x, d], mesh.h_s, inputs, still) for d in group]
+        states, errors = kernel.run(courses)
+        ends.append(states[-1, nx:].T)
+    return states[:, :nx, 0].T, errors[:, 0], np.concatenate(ends)
+
+
+def _groups(directions: np.ndarray) -> Iterator[np.ndarray]:
+    for k in range(0, len(directions), LANES):
+        yield directions[k : k + LANES]
 
 
 def monodromy_step(structure: Structure) -> ca.Function:
@@ -67,7 +98,24 @@ def monodromy_step(structure: Structure) -> ca.Function:
 
 @lru_cache(maxsize=32)
 def monodromy_kernel(structure: Structure) -> Kernel:
-    """Return the compiled `monodromy_step`."""
-    parameters, _, actuator = build(structure)
-    sizes = (BODY_STATES + actuator.states + 9, structure.segments, parameters.vector.numel())
+    """Return the compiled `monodromy_step` (of models that prescribe the curvature)."""
+    parameters, _, _ = build(structure)
+    sizes = (state_layout(structure).size + 9, structure.segments, parameters.vector.numel())
     return Kernel(f"monodromy {structure}", sizes, lambda: monodromy_step(structure))
+
+
+@lru_cache(maxsize=32)
+def tangent_kernel(structure: Structure) -> Kernel:
+    """Return a step of (x, dx), with the change of the step's length as one more valve, and (p, dp)."""
+
+    def make() -> ca.Function:
+        step = step_function(structure)
+        x, valve, h, p = (ca.SX.sym(n, step.size1_in(i)) for i, n in enumerate(("x", "valve", "h", "p")))
+        dx, dh, dp = ca.SX.sym("dx", x.numel()), ca.SX.sym("dh"), ca.SX.sym("dp", p.numel())
+        following, error = step(x, valve, h, p)
+        slope = ca.jtimes(following, ca.vertcat(x, h, p), ca.vertcat(dx, dh, dp))
+        inputs = [ca.vertcat(x, dx), ca.vertcat(valve, dh), h, ca.vertcat(p, dp)]
+        return ca.Function("tangent", inputs, [ca.vertcat(following, slope), error], {"cse": True})
+
+    nx, np_ = state_layout(structure).size, build(structure)[0].vector.numel()
+    return Kernel(f"tangent {structure}", (2 * nx, structure.segments + 1, 2 * np_), make)

@@ -18,11 +18,11 @@ import numpy as np
 from srs_opt.gait import Wave
 from srs_opt.model.parameters import GAIT_PARAMETERS, Structure
 from srs_opt.model.registry import build
+from srs_opt.orbit.laps import tangent_kernel
 from srs_opt.orbit.steady import Orbit, integrator
 from srs_opt.robot import Robot
 from srs_opt.simulate.integrate import Integrator
-from srs_opt.simulate.kernel import LANES, Course, Kernel
-from srs_opt.simulate.rosenbrock import BODY_STATES, VELOCITY, step_function
+from srs_opt.simulate.kernel import LANES, Course
 
 _TINY = 1e-30  # of the complex step
 
@@ -72,7 +72,7 @@ class _Direction:
     stretch: float = 0.0  # relative change of every step
 
 
-def sensitivity(robot: Robot, orbit: Orbit, model: str = "complex") -> Sensitivity:
+def sensitivity(robot: Robot, orbit: Orbit, model: str | None = None) -> Sensitivity:
     """Return the derivatives of a steady gait's speed and turn rate.
 
     Parameters
@@ -84,7 +84,7 @@ def sensitivity(robot: Robot, orbit: Orbit, model: str = "complex") -> Sensitivi
     names = run.parameters.names
     nx, count = run.states, len(names)
     p = run.pack(gait.pressure_kpa, gait.frequency_hz)
-    free = [*range(VELOCITY.start, VELOCITY.stop), *range(BODY_STATES, nx)]
+    free = run.layout.periodic
     start = [_Direction(0, np.eye(nx)[i], np.zeros(count)) for i in free]
     by_parameter = [_Direction(0, np.zeros(nx), row) for row in np.eye(count)]
     longer = np.where([n == "frequency_hz" for n in names], -(gait.frequency_hz**2), 0.0)
@@ -120,8 +120,10 @@ def _moved_switch(run: Integrator, orbit: Orbit, p: np.ndarray, segment: int, at
     before = after.copy()
     before[segment] = -after[segment]
     rates = _actuator_rates(run.structure)
-    jump = [np.asarray(rates(state[BODY_STATES:], v, p)).ravel() for v in (before, after)]
-    return _Direction(node, np.concatenate([np.zeros(BODY_STATES), jump[0] - jump[1]]), np.zeros(p.size))
+    jump = [np.asarray(rates(state[run.layout.actuator], v, p)).ravel() for v in (before, after)]
+    dx = np.zeros(run.states)
+    dx[run.layout.actuator] = jump[0] - jump[1]
+    return _Direction(node, dx, np.zeros(p.size))
 
 
 def _follow(run: Integrator, orbit: Orbit, p: np.ndarray, directions: list[_Direction]) -> np.ndarray:
@@ -162,24 +164,6 @@ def _motion_slope(orbit: Orbit, path: np.ndarray, stretch: float) -> np.ndarray:
         mean = np.sum((distance[1:] + distance[:-1]) / 2 * np.diff(time)) / period
         speed = mean * turn / period * np.sign(orbit.speed_m_s * orbit.turn_rate_rad_s)
     return np.array([speed.imag, (turn / period).imag]) / _TINY
-
-
-@lru_cache(maxsize=32)
-def tangent_kernel(structure: Structure) -> Kernel:
-    """Return a step of (x, dx), with the change of the step's length as one more valve, and (p, dp)."""
-
-    def make() -> ca.Function:
-        step = step_function(structure)
-        x, valve, h, p = (ca.SX.sym(n, step.size1_in(i)) for i, n in enumerate(("x", "valve", "h", "p")))
-        dx, dh, dp = ca.SX.sym("dx", x.numel()), ca.SX.sym("dh"), ca.SX.sym("dp", p.numel())
-        following, error = step(x, valve, h, p)
-        slope = ca.jtimes(following, ca.vertcat(x, h, p), ca.vertcat(dx, dh, dp))
-        inputs = [ca.vertcat(x, dx), ca.vertcat(valve, dh), h, ca.vertcat(p, dp)]
-        return ca.Function("tangent", inputs, [ca.vertcat(following, slope), error], {"cse": True})
-
-    parameters, _, actuator = build(structure)
-    nx, np_ = BODY_STATES + actuator.states, parameters.vector.numel()
-    return Kernel(f"tangent {structure}", (2 * nx, structure.segments + 1, 2 * np_), make)
 
 
 @lru_cache(maxsize=32)

@@ -1,8 +1,12 @@
-"""Newton on one period: the body velocity that a gait repeats, pose removed.
+"""Newton on one period: the dynamic states that a gait repeats, pose removed.
 
-The curvature's periodic state is known first (closed form where the actuators are linear), so only
-the three velocities at the start of the cycle are unknown; their 3 x 3 monodromy matrix is carried
-through the period with the exact derivative of every integration step.
+The actuators' periodic state is known first (closed form where they are linear), so only the dynamic states
+at the start of the cycle are unknown: the body's three velocities, and in the compliant model the bends and
+their rates. Their monodromy matrix is carried through the period with the exact derivative of every
+integration step.
+
+A soft body can have several stable orbits under one gait, so there the orbit is the one that is reached from
+rest: the motion is simulated until it has all but settled, and Newton only finishes it.
 """
 
 from __future__ import annotations
@@ -16,10 +20,13 @@ import numpy as np
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait
 from srs_opt.model.parameters import Structure
+from srs_opt.model.registry import build
+from srs_opt.model.state import WORK
+from srs_opt.orbit.actuators import periodic_actuators
 from srs_opt.orbit.laps import Lapped, lap, plain_lap
 from srs_opt.simulate.integrate import LOOSE, TOLERANCE_M_S, Integrator
 from srs_opt.simulate.mesh import Mesh
-from srs_opt.simulate.rosenbrock import BODY_STATES, LEVER_M
+from srs_opt.simulate.tableau import LEVER_M
 from srs_opt.simulate.together import Search
 
 _NEWTON_STEPS = 30
@@ -30,6 +37,15 @@ _SETTLE_PERIODS = 5
 _EVEN_STEP_S = 0.004
 _ROUGH_M_S = 1e-3
 _MESHES = 4
+_BEND_TIME_S = 0.05  # turns a bend into a rate: about 1/omega of a soft body's slowest mode
+# from rest: Newton starts where so many cycles in a row change by less than this, and must end within so many
+# times what the last change says is left to go, and within reach
+_NEARLY_M_S, _QUIET_PERIODS, _NEAR, _FARTHEST_M_S = 2e-3, 3, 3.0, 0.15
+_SAME_M_S = (
+    2e-3  # Newton's mesh is finer than that on which the motion settled, which moves the orbit a little
+)
+_MOST_PERIODS = 200
+_HALVINGS = 5
 
 
 @dataclass(frozen=True)
@@ -42,10 +58,10 @@ class PeriodicSolution:
         State at time 0, pose zero.
     states : array (nx, n)
         States after each step of `mesh`.
-    monodromy : array (3, 3)
-        Of (u_x, u_y, yaw rate x lever), so that entries compare.
+    monodromy : array (d, d)
+        Of the dynamic states, scaled so that entries compare.
     residual_m_s : float
-        By how much the velocity fails to repeat.
+        By how much they fail to repeat.
     """
 
     start: np.ndarray
@@ -55,47 +71,10 @@ class PeriodicSolution:
     monodromy: np.ndarray
     residual_m_s: float
 
-
-def periodic_actuators(run: Integrator, gait: Gait, p: np.ndarray) -> np.ndarray:
-    """Return the actuators' periodic state at time 0 (closed form where linear, else by settling)."""
-    durations, valves = gait.phases()
-    hold = _hold_function(run.structure)
-    n, s = run.actuator.states, run.structure.segments
-    if run.actuator.linear:
-        # the answers of every phase to no state, to curvature one and to rate one, in one call
-        units = np.zeros((n, 3))
-        units[:s, 1] = units[s:, 2] = 1.0
-        count = durations.size
-        ends = np.asarray(
-            hold(np.tile(units, count), np.repeat(valves, 3, axis=1), np.repeat(durations, 3)[None, :], p)
-        )
-        none, bent, bending = ends.reshape(2, s, count, 3).transpose(3, 2, 0, 1)
-        state, decay = np.zeros((2, s)), np.eye(2)
-        for forced, one, two in zip(none, bent - none, bending - none):
-            stay = np.column_stack([one[:, 0], two[:, 0]])  # segments are alike
-            state, decay = forced + stay @ state, stay @ decay
-        return np.asarray(np.linalg.solve(np.eye(2) - decay, state)).ravel()
-    fine = np.maximum(np.ceil(durations / 0.0025).astype(int), 2)
-    act = np.zeros(n)
-    for _ in range(200):
-        following = act
-        for h, valve, k in zip(durations, valves.T, fine):
-            for _ in range(k):
-                following = np.asarray(hold(following, valve, h / k, p)).ravel()
-        if np.abs(following - act).max() <= 1e-9 * (1 + np.abs(act).max()):
-            return following
-        act = following
-    raise NoAnswerError("the curvature does not settle into a cycle within 200 periods under this gait")
-
-
-@lru_cache(maxsize=32)
-def _hold_function(structure: Structure) -> ca.Function:
-    from srs_opt.model.registry import build
-
-    parameters, _, actuator = build(structure)
-    act, valve, h = ca.SX.sym("act", actuator.states), ca.SX.sym("valve", structure.segments), ca.SX.sym("h")
-    after = actuator.advance(actuator.unstack(act), valve, h).vector()
-    return ca.Function("hold", [act, valve, h, parameters.vector], [after], {"cse": True})
+    @property
+    def largest_multiplier(self) -> float:
+        """Largest modulus of the Floquet multipliers; below 1: stable."""
+        return float(np.abs(np.linalg.eigvals(self.monodromy)).max())
 
 
 def search_orbit(
@@ -105,31 +84,105 @@ def search_orbit(
 
     Parameters
     ----------
-    guess : array (3,), optional
-        Body velocity at time 0 to start from (continuation); without it, two periods are simulated from rest.
+    guess : array (d,), optional
+        Dynamic states at time 0 to start from (continuation). Without it two periods are simulated from rest;
+        in the compliant model the gait is played from rest until it settles.
 
     Raises
     ------
     NoAnswerError
-        If the velocity does not close on itself.
+        If the motion does not close on itself.
     """
-    cycle = _Cycle.of(run, gait)
+    cycle = Cycle.of(run, gait)
     mesh = Mesh.uniform(cycle.durations_s, _EVEN_STEP_S)
+    if run.structure.compliant and guess is None:
+        return (yield from _reached_from(cycle, run.rest(), mesh, tolerance))
     try:
-        velocity = np.zeros(3) if guess is None else guess
+        dynamic = np.zeros(len(run.layout.dynamic)) if guess is None else guess
         for _ in range(_WARM_UP_PERIODS if guess is None else 0):
-            velocity = (yield from cycle.plain_lap(velocity, mesh)).velocity
-        return (yield from _closed(cycle, velocity, mesh, tolerance))
+            dynamic = (yield from cycle.plain_lap(dynamic, mesh)).dynamic
+        return (yield from _closed(cycle, dynamic, mesh, tolerance))
     except NoAnswerError:  # a misleading guess, or even steps too long for this motion
-        velocity, mesh = yield from _settled(cycle, mesh, tolerance)
+        if run.structure.compliant:
+            return (yield from _reached_from(cycle, run.rest(), mesh, tolerance))
+        dynamic, mesh = yield from _settled(cycle, mesh, tolerance)
         try:
-            return (yield from _closed(cycle, velocity, mesh, tolerance, adapted=True))
+            return (yield from _closed(cycle, dynamic, mesh, tolerance, adapted=True))
         except NoAnswerError:
-            return (yield from _closed(cycle, velocity, mesh, tolerance))
+            return (yield from _closed(cycle, dynamic, mesh, tolerance))
+
+
+def reached_from(
+    run: Integrator, gait: Gait, dynamic: np.ndarray, tolerance: float = TOLERANCE_M_S
+) -> Search[PeriodicSolution]:
+    """Search the orbit that `gait` leads to from given dynamic states at time 0, actuators on their cycle.
+
+    Raises
+    ------
+    NoAnswerError
+        If the motion does not settle.
+    """
+    cycle = Cycle.of(run, gait)
+    mesh = Mesh.uniform(cycle.durations_s, _EVEN_STEP_S)
+    return (yield from _reached_from(cycle, cycle.start(dynamic), mesh, tolerance))
+
+
+def _reached_from(cycle: Cycle, x: np.ndarray, mesh: Mesh, tolerance: float) -> Search[PeriodicSolution]:
+    """Return the orbit that the motion from state `x` settles into.
+
+    Newton's orbit counts only if it is stable and near the motion that has all but settled: otherwise the
+    motion goes on, to be tried again where it changes ten times less from cycle to cycle.
+    """
+    settled, goal = 0, _NEARLY_M_S
+    before = x[cycle.run.layout.dynamic]
+    for count in range(_MOST_PERIODS):
+        lapped, mesh = yield from _accurate_lap(cycle, x, mesh, tolerance)
+        x = lapped.states[:, -1].copy()
+        x[:3], x[WORK] = 0.0, 0.0
+        change, before = cycle.size(lapped.dynamic - before), lapped.dynamic
+        settled = settled + 1 if change < goal else 0
+        if settled < _QUIET_PERIODS:
+            continue
+        try:
+            found = yield from _closed(cycle, before, mesh, tolerance, adapted=True)
+        except NoAnswerError:
+            if count > _MOST_PERIODS // 2:
+                raise
+        else:
+            away = cycle.size(found.start[cycle.run.layout.dynamic] - before)
+            largest = found.largest_multiplier
+            # what is left to go: the changes to come are a geometric series
+            if largest < 1 and away <= _SAME_M_S + min(_NEAR * change / (1 - largest), _FARTHEST_M_S):
+                return found
+        goal = change / 10
+    raise cycle.no_answer(
+        f"the motion still changes by {change:.2g} m/s from cycle to cycle after "
+        f"{_MOST_PERIODS} cycles; it does not repeat with the gait's period"
+    )
+
+
+def _accurate_lap(cycle: Cycle, x: np.ndarray, mesh: Mesh, tolerance: float) -> Search[tuple[Lapped, Mesh]]:
+    """Return a lap from state `x` on a mesh that is fine enough for it."""
+    for attempt in range(3 * _REFINEMENTS):
+        lapped = yield from plain_lap(cycle.run, x, mesh, cycle.valve, cycle.p)
+        for _ in range(_HALVINGS):  # steps can be so long that the motion leaves what numbers can hold
+            if np.isfinite(lapped.states[:, -1]).all():
+                break
+            mesh = mesh.halved()
+            lapped = yield from plain_lap(cycle.run, x, mesh, cycle.valve, cycle.p)
+        if not np.isfinite(lapped.states[:, -1]).all():
+            raise cycle.no_answer(
+                "the motion stops being finite; check pressure, masses, time constants and effect sizes"
+            )
+        if lapped.error_m_s.max() <= LOOSE * tolerance:
+            break
+        least = tolerance if attempt >= _REFINEMENTS else 0.0  # from then on it only gets finer
+        mesh = mesh.refined(np.maximum(lapped.error_m_s, least), tolerance)
+    return lapped, mesh
 
 
 @dataclass(frozen=True)
-class _Cycle:
+class Cycle:
     """What stays the same while the orbit of one gait is searched."""
 
     run: Integrator
@@ -138,36 +191,48 @@ class _Cycle:
     valve: np.ndarray
     act: np.ndarray
     p: np.ndarray
-    scale: np.ndarray  # makes the velocity's three entries comparable
+    scale: np.ndarray  # makes the dynamic states comparable, as speeds
 
     @staticmethod
-    def of(run: Integrator, gait: Gait) -> _Cycle:
+    def of(run: Integrator, gait: Gait) -> Cycle:
+        """Return the cycle of `gait`, with the actuators' periodic state."""
         p = run.pack(gait.pressure_kpa, gait.frequency_hz)
         act = periodic_actuators(run, gait, p)
         scale = np.array([1.0, 1.0, LEVER_M / _inertia(run, act, p)])
-        return _Cycle(run, gait, *gait.phases(), act, p, scale)
+        if run.structure.compliant:
+            bend = LEVER_M * run.robot.segment_length_m * np.ones(run.structure.segments)
+            scale = np.concatenate([scale, bend / _BEND_TIME_S, bend])
+        return Cycle(run, gait, *gait.phases(), act, p, scale)
 
-    def start(self, velocity: np.ndarray) -> np.ndarray:
-        return np.concatenate([np.zeros(3), velocity, np.zeros(BODY_STATES - 6), self.act])
+    def start(self, dynamic: np.ndarray) -> np.ndarray:
+        """Return the state at time 0 with the actuators on their cycle."""
+        x = np.zeros(self.run.states)
+        x[self.run.layout.dynamic] = dynamic
+        x[self.run.layout.actuator] = self.act
+        return x
 
-    def lap(self, velocity: np.ndarray, mesh: Mesh) -> Search[Lapped]:
-        return lap(self.run, self.start(velocity), mesh, self.valve, self.p)
+    def lap(self, dynamic: np.ndarray, mesh: Mesh) -> Search[Lapped]:
+        """Return a lap with its monodromy matrix."""
+        return lap(self.run, self.start(dynamic), mesh, self.valve, self.p)
 
-    def plain_lap(self, velocity: np.ndarray, mesh: Mesh) -> Search[Lapped]:
-        return plain_lap(self.run, self.start(velocity), mesh, self.valve, self.p)
+    def plain_lap(self, dynamic: np.ndarray, mesh: Mesh) -> Search[Lapped]:
+        """Return a lap without derivative."""
+        return plain_lap(self.run, self.start(dynamic), mesh, self.valve, self.p)
 
     def no_answer(self, why: str) -> NoAnswerError:
+        """Return the error that names the gait."""
         at = f"{self.gait.frequency_hz:.3g} Hz, {self.gait.pressure_kpa:.3g} kPa"
         return NoAnswerError(f"no steady gait found at {at}: {why}")
 
-    def size(self, velocity_change: np.ndarray) -> float:
-        return float(np.linalg.norm(self.scale * velocity_change))
+    def size(self, change: np.ndarray) -> float:
+        """Return the norm of a change of the dynamic states, m/s."""
+        return float(np.linalg.norm(self.scale * change))
 
 
 def _closed(
-    cycle: _Cycle, velocity: np.ndarray, mesh: Mesh, tolerance: float, *, adapted: bool = False
+    cycle: Cycle, dynamic: np.ndarray, mesh: Mesh, tolerance: float, *, adapted: bool = False
 ) -> Search[PeriodicSolution]:
-    """Return the orbit near `velocity`, on meshes that fit its motion better and better.
+    """Return the orbit near `dynamic`, on meshes that fit its motion better and better.
 
     A mesh that is `adapted` already is never made coarser: this motion needs it.
     """
@@ -180,9 +245,9 @@ def _closed(
         if lapped is not None:
             wanted = tolerance / attempt  # finer each time, so that this ends
             mesh = mesh.refined(np.maximum(lapped.error_m_s, wanted if adapted else 0.0), wanted)
-        velocity, lapped, count = yield from _newton(cycle, velocity, mesh, goal_m_s)
+        dynamic, lapped, count = yield from _newton(cycle, dynamic, mesh, goal_m_s)
         total += count
-        size = cycle.size(lapped.velocity - velocity)
+        size = cycle.size(lapped.dynamic - dynamic)
         closed = size <= max(goal_m_s, 1e-6)
         if not closed and (attempt == len(goals) - 1 or not size <= _ROUGH_M_S):
             raise cycle.no_answer(
@@ -192,61 +257,51 @@ def _closed(
             break
     assert lapped is not None
     monodromy = cycle.scale[:, None] * lapped.monodromy / cycle.scale
-    return PeriodicSolution(cycle.start(velocity), lapped.states, mesh, cycle.valve, monodromy, size)
+    return PeriodicSolution(cycle.start(dynamic), lapped.states, mesh, cycle.valve, monodromy, size)
 
 
 def _newton(
-    cycle: _Cycle, velocity: np.ndarray, mesh: Mesh, goal_m_s: float
+    cycle: Cycle, dynamic: np.ndarray, mesh: Mesh, goal_m_s: float
 ) -> Search[tuple[np.ndarray, Lapped, int]]:
-    """Return velocity, the lap from it, and how many steps it took; settles where Newton stalls."""
-    lapped = yield from cycle.lap(velocity, mesh)
+    """Return the dynamic states, the lap from it, and how many steps it took; settles where Newton stalls."""
+    lapped = yield from cycle.lap(dynamic, mesh)
     count = 0
-    while (size := cycle.size(lapped.velocity - velocity)) > goal_m_s and count < _NEWTON_STEPS:
+    while (size := cycle.size(lapped.dynamic - dynamic)) > goal_m_s and count < _NEWTON_STEPS:
         count += 1
-        step = _newton_direction(lapped.monodromy, lapped.velocity - velocity)
+        step = _newton_direction(lapped.monodromy, lapped.dynamic - dynamic)
         for factor in (1.0, 0.3, 0.1) if np.isfinite(step).all() else ():
-            trial = velocity + factor * step
+            trial = dynamic + factor * step
             there = yield from cycle.lap(trial, mesh)
-            if cycle.size(there.velocity - trial) < (1 - 0.1 * factor) * size:
+            if cycle.size(there.dynamic - trial) < (1 - 0.1 * factor) * size:
                 break
         else:  # no descent along Newton's direction: let the motion itself settle
-            trial = velocity
+            trial = dynamic
             for _ in range(_SETTLE_PERIODS):
-                trial = (yield from cycle.plain_lap(trial, mesh)).velocity
+                trial = (yield from cycle.plain_lap(trial, mesh)).dynamic
             there = yield from cycle.lap(trial, mesh)
-        velocity, lapped = trial, there
-    return velocity, lapped, count
+        dynamic, lapped = trial, there
+    return dynamic, lapped, count
 
 
 def _newton_direction(m: np.ndarray, residual: np.ndarray) -> np.ndarray:
     """Return Newton's step, not-a-number where the monodromy matrix says nothing."""
     try:
-        return np.asarray(np.linalg.solve(np.eye(3) - m, residual))
+        return np.asarray(np.linalg.solve(np.eye(len(m)) - m, residual))
     except np.linalg.LinAlgError:
-        return np.full(3, np.nan)
+        return np.full(len(m), np.nan)
 
 
-def _settled(cycle: _Cycle, mesh: Mesh, tolerance: float) -> Search[tuple[np.ndarray, Mesh]]:
-    """Return the velocity after some periods from rest and a mesh on which that motion is accurate."""
-    velocity, mesh = np.zeros(3), mesh.halved().halved()
+def _settled(cycle: Cycle, mesh: Mesh, tolerance: float) -> Search[tuple[np.ndarray, Mesh]]:
+    """Return the dynamic states after some periods from rest and a mesh on which that motion is accurate."""
+    dynamic, mesh = np.zeros(len(cycle.run.layout.dynamic)), mesh.halved().halved()
     for _ in range(_SETTLING_PERIODS):
-        for _ in range(_REFINEMENTS):
-            lapped = yield from cycle.plain_lap(velocity, mesh)
-            if not np.isfinite(lapped.states[:, -1]).all():
-                raise cycle.no_answer(
-                    "the motion stops being finite; check pressure, masses, time constants and effect sizes"
-                )
-            if lapped.error_m_s.max() <= LOOSE * tolerance:
-                break
-            mesh = mesh.refined(lapped.error_m_s, tolerance)
-        velocity = lapped.velocity
-    return velocity, mesh
+        lapped, mesh = yield from _accurate_lap(cycle, cycle.start(dynamic), mesh, tolerance)
+        dynamic = lapped.dynamic
+    return dynamic, mesh
 
 
 @lru_cache(maxsize=32)
 def _inertia_function(structure: Structure) -> ca.Function:
-    from srs_opt.model.registry import build
-
     parameters, mechanics, _ = build(structure)
     outputs = [mechanics.yaw_inertia(), mechanics.yaw_momentum_of_shape()]
     return ca.Function(

@@ -14,7 +14,7 @@ from srs_opt.orbit.motion import CycleMotion, cycle_motion, rotate
 from srs_opt.orbit.solve import PeriodicSolution, search_orbit
 from srs_opt.robot import Robot
 from srs_opt.simulate.integrate import TOLERANCE_M_S, Integrator
-from srs_opt.simulate.rosenbrock import BODY_STATES, VELOCITY, WORK
+from srs_opt.simulate.rosenbrock import WORK
 from srs_opt.simulate.shapes import centre_lines
 from srs_opt.simulate.together import Search, alone, together
 from srs_opt.sweep import sweep
@@ -34,10 +34,11 @@ class Orbit:
         Speed, turn rate, radius, envelope.
     work_j : float
         Friction work per cycle.
-    velocity : array (3,)
-        Body velocity (u_x, u_y, yaw momentum) at time 0; a start for neighbouring gaits.
-    multipliers : complex array (3,)
-        Floquet multipliers of the body velocity (pose removed), largest first.
+    dynamic : array (d,)
+        Dynamic states at time 0, a start for neighbouring gaits: body velocity (u_x, u_y, yaw momentum), in
+        the compliant model bends (1/m) and their rates as well.
+    multipliers : complex array (d,)
+        Floquet multipliers of the dynamic states (pose removed), largest first.
     shape_multiplier : float
         Largest Floquet multiplier of the actuators, exp(-period / max tau).
     time_s, pose, kappa : arrays (n,), (n, 3), (n, N-1)
@@ -48,13 +49,18 @@ class Orbit:
     gait: Gait
     motion: CycleMotion
     work_j: float
-    velocity: np.ndarray
+    dynamic: np.ndarray
     multipliers: np.ndarray
     shape_multiplier: float
     time_s: np.ndarray
     pose: np.ndarray
     kappa: np.ndarray
     solution: PeriodicSolution
+
+    @property
+    def velocity(self) -> np.ndarray:
+        """Body velocity (u_x, u_y, yaw momentum) at time 0, (3,)."""
+        return self.dynamic[:3]
 
     @property
     def speed_m_s(self) -> float:
@@ -83,7 +89,7 @@ class Orbit:
 
 
 @lru_cache(maxsize=64)
-def integrator(robot: Robot, model: str = "complex") -> Integrator:
+def integrator(robot: Robot, model: str | None = None) -> Integrator:
     """Return the integrator of a robot without effects that know the room (they have no steady gait)."""
     return Integrator(robot, model, room=False)
 
@@ -91,7 +97,7 @@ def integrator(robot: Robot, model: str = "complex") -> Integrator:
 def steady_gait(
     robot: Robot,
     gait: Gait,
-    model: str = "complex",
+    model: str | None = None,
     *,
     tolerance: float = TOLERANCE_M_S,
     guess: np.ndarray | None = None,
@@ -104,8 +110,9 @@ def steady_gait(
         The gait must drive every segment of the robot.
     tolerance : float
         Local error of the integration, m/s per step.
-    guess : array (3,), optional
-        Body velocity at time 0 of a neighbouring gait.
+    guess : array (d,), optional
+        Dynamic states at time 0 of a neighbouring gait's orbit. Without it the orbit of a compliant model is
+        the one that is reached from rest.
 
     Raises
     ------
@@ -121,7 +128,7 @@ def steady_gait(
 def steady_gaits(
     robot: Robot,
     gaits: Sequence[Gait],
-    model: str = "complex",
+    model: str | None = None,
     *,
     tolerance: float = TOLERANCE_M_S,
     jobs: int = 1,
@@ -129,7 +136,8 @@ def steady_gaits(
     """Return the steady states of many gaits, several at a time in each call of the compiled code.
 
     Gaits that follow each other in the list should be alike: every hundred or so are cut into ``CHAINS``
-    parts, and in each part a gait's orbit is the guess for the next. `jobs` processes share the work; the
+    parts, and in each part a gait's orbit is the guess for the next (not in the compliant model: every gait
+    starts from rest). `jobs` processes share the work; the
     results are the same. For a gait without a steady state the error says why.
 
     Raises
@@ -144,7 +152,7 @@ def steady_gaits(
 
 
 def _side_by_side(
-    robot: Robot, model: str, tolerance: float, gaits: Sequence[Gait]
+    robot: Robot, model: str | None, tolerance: float, gaits: Sequence[Gait]
 ) -> list[Orbit | NoAnswerError]:
     run = integrator(robot, model)
     parts = np.array_split(np.arange(len(gaits)), min(CHAINS, max(len(gaits), 1)))
@@ -168,7 +176,7 @@ def _chain(run: Integrator, gaits: Sequence[Gait], tolerance: float) -> Search[l
             guess = None
         else:
             found.append(orbit)
-            guess = orbit.velocity
+            guess = None if run.structure.compliant else orbit.dynamic
     return found
 
 
@@ -178,12 +186,16 @@ def _check_segments(robot: Robot, gait: Gait) -> None:
 
 
 def _search(run: Integrator, gait: Gait, tolerance: float, guess: np.ndarray | None) -> Search[Orbit]:
+    _check_segments(run.robot, gait)
+    return orbit_of(run, gait, (yield from search_orbit(run, gait, tolerance, guess)))
+
+
+def orbit_of(run: Integrator, gait: Gait, solution: PeriodicSolution) -> Orbit:
+    """Return the steady gait that a periodic solution is."""
     robot = run.robot
-    _check_segments(robot, gait)
-    solution = yield from search_orbit(run, gait, tolerance, guess)
     time_s = np.concatenate([[0.0], np.cumsum(solution.mesh.h_s)])
     states = np.concatenate([solution.start[:, None], solution.states], axis=1)
-    pose, kappa = states[:3].T, states[BODY_STATES : BODY_STATES + robot.segments].T
+    pose, kappa = states[:3].T, states[run.layout.kappa].T
     # the delay of the valves shifts the whole cycle in time and changes nothing else
     motion = cycle_motion(*body_over_cycle(run, time_s, pose, kappa), robot.body_width_m)
     multipliers = np.linalg.eigvals(solution.monodromy)
@@ -191,7 +203,7 @@ def _search(run: Integrator, gait: Gait, tolerance: float, guess: np.ndarray | N
         gait=gait,
         motion=motion,
         work_j=float(solution.states[WORK, -1]),
-        velocity=solution.start[VELOCITY].copy(),
+        dynamic=solution.start[run.layout.dynamic],
         multipliers=multipliers[np.argsort(-abs(multipliers))],
         shape_multiplier=float(np.exp(-gait.period_s / max(robot.tau1_s, robot.tau2_s))),
         time_s=time_s,

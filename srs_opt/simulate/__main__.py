@@ -6,7 +6,15 @@ import argparse
 import math
 import sys
 
-from srs_opt.command import Answer, Parser, finite_float, make_parser, positive_float, run_command
+from srs_opt.command import (
+    Answer,
+    Parser,
+    chosen_model,
+    finite_float,
+    make_parser,
+    positive_float,
+    run_command,
+)
 
 
 def build_parser() -> Parser:
@@ -54,14 +62,15 @@ def run(options: argparse.Namespace) -> Answer:
     from srs_opt.simulate.run import simulate
 
     robot = load_robot(options.robot)
+    model = chosen_model(options, robot)
     if options.gait:
         gait = load_gait(options.gait, options.pressure)
     else:
         lag = 2 * math.pi / robot.segments if options.phase_lag is None else options.phase_lag
         gait = Wave.uniform(robot.segments, options.frequency, options.pressure, lag, options.offset).gait()
-    result = simulate(robot, gait, options.duration, options.model, options.heading)
+    result = simulate(robot, gait, options.duration, model, options.heading)
     files = [write_trajectory(result.trajectory, options.out / "trajectory.csv")]
-    files += draw_simulation(robot, options.model, result, options.out / "trajectory")
+    files += draw_simulation(robot, model, result, options.out / "trajectory")
     record = {
         "speed_m_s": result.speed_m_s,
         "turn_rate_rad_s": result.turn_rate_rad_s,

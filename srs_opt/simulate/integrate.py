@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 
 from srs_opt.errors import NoAnswerError
 from srs_opt.model.parameters import Structure, valve_delay_s
-from srs_opt.model.registry import build
+from srs_opt.model.registry import build, state_layout
+from srs_opt.model.state import POSE, VELOCITY, WORK, StateLayout
 from srs_opt.robot import Robot
 from srs_opt.simulate.kernel import Kernel
 from srs_opt.simulate.mesh import Mesh
-from srs_opt.simulate.rosenbrock import BODY_STATES, step_function
+from srs_opt.simulate.rosenbrock import step_function
 from srs_opt.simulate.timeline import Timeline
 from srs_opt.simulate.together import Search, Stretch, alone
 
-_REFINEMENTS = 3
+_REFINEMENTS = 3  # of a mesh, coarser here and finer there; after them it only gets finer
+_ATTEMPTS = 12
+_HALVINGS = 5  # of a mesh whose steps are so long that the motion leaves what numbers can hold
 STEP_S = 0.005  # first guess of the step
 LOOSE = 8.0  # a mesh is kept while no step errs by more than this many tolerances
 MANY = 32  # alike pieces integrated in one call
@@ -27,8 +31,8 @@ TOLERANCE_M_S = 3e-5  # local error of the body speed per step: about 1e-4 of th
 @lru_cache(maxsize=32)
 def step_kernel(structure: Structure) -> Kernel:
     """Return the compiled `step_function`."""
-    parameters, _, actuator = build(structure)
-    sizes = (BODY_STATES + actuator.states, structure.segments, parameters.vector.numel())
+    parameters, _, _ = build(structure)
+    sizes = (state_layout(structure).size, structure.segments, parameters.vector.numel())
     return Kernel(f"step {structure}", sizes, lambda: step_function(structure))
 
 
@@ -46,7 +50,10 @@ class Trajectory:
     work_j : array (n,)
         Friction work since the start.
     kappa, dkappa : array (n, N-1)
-        Curvatures (1/m) and their rates.
+        Curvatures (1/m) of the body and their rates.
+    no_load, no_load_rate : array (n, N-1)
+        Curvatures that the actuators would give without load, and their rates; the body's own in the models
+        that prescribe them.
     final : array
         The whole last state, to go on from.
     error_m_s : array (n-1,)
@@ -59,6 +66,8 @@ class Trajectory:
     work_j: np.ndarray
     kappa: np.ndarray
     dkappa: np.ndarray
+    no_load: np.ndarray
+    no_load_rate: np.ndarray
     final: np.ndarray
     error_m_s: np.ndarray
 
@@ -71,15 +80,25 @@ class Trajectory:
             kappa = PchipInterpolator(self.time_s, self.kappa, axis=0)(time_s)
         return pose, kappa
 
+    def then(self, later: Trajectory) -> Trajectory:
+        """Return this motion and the one that goes on from its final state as one."""
+        joined = {
+            f.name: np.concatenate([getattr(self, f.name), getattr(later, f.name)[1:]]) for f in fields(self)
+        }
+        joined["time_s"][self.time_s.size :] += self.time_s[-1]
+        joined |= {"final": later.final, "error_m_s": np.concatenate([self.error_m_s, later.error_m_s])}
+        return Trajectory(**joined)
+
 
 class Integrator:
     """Runs one robot's model; holds the compiled step and nothing that changes."""
 
-    def __init__(self, robot: Robot, model: str = "complex", *, room: bool = True) -> None:
+    def __init__(self, robot: Robot, model: str | None = None, *, room: bool = True) -> None:
         self.robot = robot
         self.structure = Structure.of(robot, model, room=room)
         self.parameters, self.mechanics, self.actuator = build(self.structure)
-        self.states = BODY_STATES + self.actuator.states
+        self.layout = state_layout(self.structure)
+        self.states = self.layout.size
         self.kernel = step_kernel(self.structure)
         self._room = room
 
@@ -123,7 +142,7 @@ class Integrator:
         times, states, errors = [np.zeros(1)], [x[:, None]], []
         start = 0.0
         known: dict[bytes, Mesh] = {}
-        for piece, key, repeats in _runs_of_alike(_pieces(timeline)):
+        for piece, key, repeats in _runs_of_alike(self.pieces(timeline)):
             p = self.pack(float(piece.pressure_kpa[0]), float(piece.frequency_hz[0]))
             mesh = known.get(key) or Mesh.uniform(piece.duration_s, STEP_S)
             done = 1
@@ -141,8 +160,20 @@ class Integrator:
             np.concatenate(times),
             np.concatenate(states, axis=1),
             np.concatenate(errors),
-            self.actuator.segments,
+            self.layout,
         )
+
+    def pieces(self, timeline: Timeline) -> list[Timeline]:
+        """Cut a timeline into pieces of one pressure and frequency, a cycle each at most, to be integrated.
+
+        Linear actuators know pressure only times the valve's state, so that a cycle whose pressure changes
+        is one piece all the same.
+        """
+        if not self.actuator.linear:
+            return _pieces(timeline)
+        whole = replace(timeline, pressure_kpa=np.zeros(timeline.duration_s.size))
+        cut = np.cumsum([0, *(piece.duration_s.size for piece in _pieces(whole))])
+        return [timeline.part(slice(a, b)).at_one_pressure() for a, b in pairwise(cut)]
 
     def _alike(
         self, x: np.ndarray, mesh: Mesh, valve: np.ndarray, p: np.ndarray, many: int, tolerance: float
@@ -151,15 +182,25 @@ class Integrator:
 
         Returns states (nx, n), errors (n,), the mesh of each piece and how many pieces were done.
         """
-        for _ in range(_REFINEMENTS):
+        halvings = 0
+        for attempt in range(_ATTEMPTS):
             repeated = mesh.repeated(many, valve.shape[1])
-            states, errors = yield from self.stepping(x, repeated, np.tile(valve, many), p)
+            try:
+                states, errors = yield from self.stepping(x, repeated, np.tile(valve, many), p)
+            except NoAnswerError:
+                halvings += many == 1
+                if halvings > _HALVINGS:
+                    raise
+                mesh, many = mesh if many > 1 else mesh.halved(), 1
+                continue
             worst = errors.reshape(many, -1).max(axis=1)
             good = int(np.argmax([*(worst > LOOSE * tolerance), True]))
             if good:
                 kept = good * mesh.h_s.size
                 return states[:, :kept], errors[:kept], mesh, good
-            mesh, many = mesh.refined(errors[: mesh.h_s.size], tolerance), 1
+            # stretches at rest look easy until their steps are longer than what happens at their end
+            least = tolerance if attempt >= _REFINEMENTS else 0.0
+            mesh, many = mesh.refined(np.maximum(errors[: mesh.h_s.size], least), tolerance), 1
         states, errors = yield from self.stepping(x, mesh, valve, p)
         return states, errors, mesh, 1
 
@@ -209,15 +250,19 @@ def _pieces(timeline: Timeline, longest_phases: int = 40) -> list[Timeline]:
     return pieces
 
 
-def _trajectory(time_s: np.ndarray, states: np.ndarray, errors: np.ndarray, segments: int) -> Trajectory:
-    act = states[BODY_STATES:]
+def _trajectory(
+    time_s: np.ndarray, states: np.ndarray, errors: np.ndarray, layout: StateLayout
+) -> Trajectory:
+    actuators = states[layout.actuator]
     return Trajectory(
         time_s=time_s,
-        pose=states[:3].T,
-        velocity=states[3:6].T,
-        work_j=states[6],
-        kappa=act[:segments].T,
-        dkappa=act[segments : 2 * segments].T,
+        pose=states[POSE].T,
+        velocity=states[VELOCITY].T,
+        work_j=states[WORK],
+        kappa=states[layout.kappa].T,
+        dkappa=states[layout.dkappa].T,
+        no_load=actuators[: layout.segments].T,
+        no_load_rate=actuators[layout.segments : 2 * layout.segments].T,
         final=states[:, -1],
         error_m_s=errors,
     )

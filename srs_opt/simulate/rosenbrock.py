@@ -5,7 +5,7 @@ known in closed form, and valves switch only between steps. A linearly implicit 
 matrix is 3 x 3 (the body's velocity; the pose is eliminated) fits: no iterations, so the step is
 one expression that can be mapped over a mesh, differentiated and compiled.
 
-Source: E. Hairer and G. Wanner, Solving Ordinary Differential Equations II, IV.7 and IV.10 (RODAS).
+The compliant model, whose bends are stiff too, has a step of its own (`compliant_step`).
 """
 
 from __future__ import annotations
@@ -18,29 +18,12 @@ from srs_opt.model.actuator import Actuator, ActuatorState
 from srs_opt.model.mechanics import Mechanics
 from srs_opt.model.parameters import Structure
 from srs_opt.model.registry import build
-
-GAMMA = 0.25
-NODES = (0.0, 0.386, 0.21, 0.63, 1.0, 1.0)
-TIME_WEIGHTS = (0.25, -0.1043, 0.1035, -0.03620000000000023, 0.0, 0.0)
-STAGES = (
-    (),
-    (1.544,),
-    (0.9466785280815826, 0.2557011698983284),
-    (3.314825187068521, 2.896124015972201, 0.9986419139977817),
-    (1.221224509226641, 6.019134481288629, 12.53708332932087, -0.687886036105895),
-)
-COUPLING = (
-    (),
-    (-5.6688,),
-    (-2.430093356833875, -0.2063599157091915),
-    (-0.1073529058151375, -9.594562251023355, -20.47028614809616),
-    (7.496443313967647, -10.24680431464352, -33.99990352819905, 11.7089089320616),
-    (8.083246795921522, -7.981132988064893, -31.52159432874371, 16.31930543123136, -6.058818238834054),
-)
-
-POSE, VELOCITY, WORK = slice(0, 3), slice(3, 6), 6
-BODY_STATES = 7
-LEVER_M = 0.1  # turns an error in yaw rate into one in speed
+from srs_opt.model.state import BODY_STATES as BODY_STATES
+from srs_opt.model.state import POSE as POSE
+from srs_opt.model.state import VELOCITY as VELOCITY
+from srs_opt.model.state import WORK as WORK
+from srs_opt.simulate.compliant_step import compliant_step
+from srs_opt.simulate.tableau import COUPLING, GAMMA, LEVER_M, NODES, STAGES, TIME_WEIGHTS
 
 
 class _BodyField:
@@ -101,6 +84,8 @@ def step_function(structure: Structure) -> ca.Function:
     [-1, 1], `h` in s (zero is allowed and does nothing), `p` as packed by `Parameters`. `error` is the
     embedded estimate of the local error of the body's velocity, m/s.
     """
+    if structure.compliant:
+        return compliant_step(structure)
     parameters, mechanics, actuator = build(structure)
     x = ca.SX.sym("x", BODY_STATES + actuator.states)
     valve, h = ca.SX.sym("valve", structure.segments), ca.SX.sym("h")

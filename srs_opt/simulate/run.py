@@ -49,7 +49,7 @@ class Simulation:
 
 
 def simulate(
-    robot: Robot, gait: Gait, duration_s: float, model: str = "complex", heading_rad: float = 0.0
+    robot: Robot, gait: Gait, duration_s: float, model: str | None = None, heading_rad: float = 0.0
 ) -> Simulation:
     """Run `gait` from the straight robot at rest for `duration_s`, every period integrated.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -72,6 +72,17 @@ class Timeline:
             self.pressure_kpa[phases],
             self.frequency_hz[phases],
         )
+
+    def at_one_pressure(self) -> Timeline:
+        """Return the timeline at its highest pressure throughout, valves in parts of it.
+
+        Where the actuators are linear, curvature follows pressure times valve state.
+        """
+        most = float(self.pressure_kpa.max())
+        if (self.pressure_kpa == most).all():
+            return self
+        pressure = np.full(self.duration_s.size, most)
+        return replace(self, valve=self.valve * self.pressure_kpa / most, pressure_kpa=pressure)
 
     def until(self, end_s: float) -> Timeline:
         """Return the timeline cut off at `end_s`."""

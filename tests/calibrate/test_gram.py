@@ -59,6 +59,34 @@ def test_bounds_are_those_of_a_general_solver(seed):
     assert np.all(mine.step >= lower - 1e-12)
 
 
+def test_a_coordinate_leaves_its_bound_again():
+    # the first unconstrained step breaks two bounds; at the optimum only one of them holds
+    slopes = np.array([[2.0, -2, -3], [-1, -1, 2], [0, -3, -1], [1, 2, 2]])
+    residual = np.array([3.0, -2, 3, -3])
+    gram = trial_gram(residual, slopes, 1.0, (), np.zeros(0), np.zeros(0)).eliminated()
+    mine = bounded_solve(gram.matrix, range(3), np.zeros(3), np.zeros(3), np.zeros(3))
+    theirs = optimize.lsq_linear(slopes, residual, (0, np.inf), tol=1e-14)
+    assert mine.deviance == pytest.approx(2 * theirs.cost, rel=1e-9)
+    assert mine.deviance == pytest.approx(26.83, abs=0.01)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_bounds_and_priors_are_those_of_a_general_solver(seed):
+    rng = np.random.default_rng(seed)
+    slopes, residual = rng.standard_normal((12, 6)), 3 * rng.standard_normal(12)
+    precision, offset = rng.uniform(0, 2, 6) * (rng.random(6) < 0.5), rng.standard_normal(6)
+    lower = np.where(rng.random(6) < 0.7, rng.uniform(-0.3, 0.3, 6), -np.inf)
+    gram = trial_gram(residual, slopes, 1.0, (), np.zeros(0), np.zeros(0)).eliminated()
+    mine = bounded_solve(gram.matrix, range(6), precision, offset, lower)
+    root = np.sqrt(precision)
+    matrix = np.concatenate([slopes, np.diag(root)])
+    wanted = np.concatenate([residual, -root * offset])
+    theirs = optimize.lsq_linear(matrix, wanted, (lower, np.full(6, np.inf)), tol=1e-14)
+    assert mine.step == pytest.approx(theirs.x, abs=1e-6)
+    assert mine.deviance == pytest.approx(2 * theirs.cost, rel=1e-9)
+    assert np.all(np.diag(mine.covariance)[mine.step <= lower + 1e-9] == 0)
+
+
 def scattered(seed=0):
     slopes, residual = problem(seed)
     sd, now = np.array([0.02, 0.05]), np.array([0.01, -0.03])

@@ -35,7 +35,7 @@ class Line:
         return self.answer()
 
     def select(self, gait):
-        return self.command(Command.SELECT, gait.to_bytes(2, "little"))
+        return self.command(Command.SELECT, protocol.select_payload(gait, gait))
 
     def answer(self):
         new = self.receiver.feed(self.controller.send())
@@ -99,6 +99,15 @@ def test_a_gait_changes_only_where_the_cycle_ends(tmp_path):
     wanted += [quick.valve((k + 0.5) * 1e-3) for k in range(80)]
     np.testing.assert_array_equal(played, wanted)
     assert set(pressure[:70]) == {40.0} and set(pressure[70:]) == {50.0}
+
+
+def test_a_single_cycle_is_followed_by_venting_unless_a_word_comes_in_time(tmp_path):
+    line = flashed(tmp_path)
+    line.command(Command.SELECT, protocol.select_payload(0, None))
+    line.ticks(SETTLE + 60)
+    line.command(Command.SELECT, protocol.select_payload(1, None))
+    played, _ = line.ticks(40 + 80 + 50)
+    assert played[:120].any(axis=1).all() and not played[120:].any()
 
 
 def test_a_plan_runs_by_itself_and_vents_at_its_end(tmp_path):

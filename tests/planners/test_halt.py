@@ -38,12 +38,12 @@ def test_vented_it_rolls_as_far_as_friction_lets_it(before_wall, robot):
 
 def test_vents_at_once_where_there_is_room(before_wall):
     problem, state = before_wall(0.5)
-    assert not halt(Foresight(problem), state).valve.any()
+    assert not halt(Foresight(problem), state, problem.motion.rest).valve.any()
 
 
 def test_brakes_where_venting_would_touch(before_wall):
     problem, state = before_wall(0.15)
     assert Foresight(problem).room_m(state, vented(problem)) <= 0
-    chosen = halt(Foresight(problem), state)
+    chosen = halt(Foresight(problem), state, problem.motion.rest)
     assert chosen.valve.any() and Foresight(problem).room_m(state, chosen) > 0
     assert not chosen.valve[:, -1].any() and np.isclose(chosen.duration_s[-1], COAST_S)

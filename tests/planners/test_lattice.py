@@ -148,6 +148,8 @@ def test_wider_beams_are_not_slower(problem_in):
 def test_cycles_side_by_side_are_those_alone(problem_in):
     problem = problem_in(corridor(0.3))
     state = problem.run.rest(0.3, 0.15, 0.1)
-    together = problem.simulate_all([(state, gait) for gait in range(problem.motion.size)])
+    together = problem.simulate_all(
+        [(state, problem.motion.rest, gait) for gait in range(problem.motion.size)]
+    )
     for gait, cycle in enumerate(together):
-        assert np.array_equal(cycle.state, problem.simulate(state, gait).state)
+        assert np.array_equal(cycle.state, problem.simulate(state, problem.motion.rest, gait).state)

@@ -8,16 +8,14 @@ from planners.motion.store import _read, table_key, write_transitions
 from planners.motion.table import body_in_room
 from srs_opt.model.outline import centre_line_function
 from srs_opt.orbit.steady import integrator
-from srs_opt.simulate.timeline import Timeline
 
 
-def drive(robot, gaits, order):
+def drive(robot, motion, order):
     """Simulate adaptively, a cycle each: yields (state before, gait before, gait, state after)."""
     run = integrator(robot)
-    state, before = run.rest(), len(gaits.gaits)
+    state, before = run.rest(), motion.rest
     for now in order:
-        gait = gaits.gaits[now].gait
-        after = run.run(Timeline.of_gait(gait, gait.period_s), state).final
+        after = run.run(motion.joints.timeline(before, now), state).final
         yield state, before, now, after
         state, before = after, now
 
@@ -25,7 +23,7 @@ def drive(robot, gaits, order):
 def test_predicts_a_cycle_to_millimetres(robot, gaits, motion):
     errors = []
     order = np.random.default_rng(1).integers(0, motion.size, 40).repeat(2)
-    for state, before, now, after in drive(robot, gaits, order):
+    for state, before, now, after in drive(robot, motion, order):
         pose, speed = motion.move_one(*state[:3], before, state[3], now)
         off = np.hypot(*(pose[-1, :2] - after[:2])), abs(pose[-1, 2] - after[2]), abs(speed - after[3])
         errors.append(off)
@@ -35,7 +33,7 @@ def test_predicts_a_cycle_to_millimetres(robot, gaits, motion):
 
 
 def test_first_cycle_from_rest_is_exact(robot, gaits, motion):
-    for state, before, now, after in drive(robot, gaits, [0]):
+    for state, before, now, after in drive(robot, motion, [0]):
         pose, speed = motion.move_one(*state[:3], before, 0.0, now)
         assert pose[-1] == pytest.approx(after[:3], abs=3e-4)
         assert speed == pytest.approx(after[3], abs=1e-3)

@@ -85,7 +85,7 @@ def test_names_cannot_break_the_page(driven, tmp_path):
 
 @pytest.mark.parametrize(
     "change",
-    [{"version": 2}, {"runs": []}, {"runs": [{"name": "planned"}]}, {"body_width_m": "wide"}],
+    [{"version": 1}, {"runs": []}, {"runs": [{"name": "planned"}]}, {"body_width_m": "wide"}],
     ids=lambda change: next(iter(change)),
 )
 def test_other_files_are_refused_in_one_line(driven, tmp_path, change):

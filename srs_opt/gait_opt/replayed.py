@@ -1,0 +1,32 @@
+"""A table's gaits on another robot: the same valves, the motion that this robot makes of them."""
+
+from __future__ import annotations
+
+from srs_opt.errors import NoAnswerError
+from srs_opt.gait_opt.table import GaitTable, TableGait
+from srs_opt.orbit.steady import steady_gaits
+from srs_opt.robot import Robot
+
+SLOWEST_M_S = 0.01  # a gait that creeps serves no plan
+
+
+def replayed(robot: Robot, table: GaitTable, model: str | None = None, *, jobs: int = 1) -> GaitTable:
+    """Return the gaits of `table` as `robot` runs them from rest; what is unstable or creeps is left out.
+
+    Raises
+    ------
+    NoAnswerError
+        If no gait is left.
+    """
+    model = model or robot.own_model
+    orbits = steady_gaits(robot, [entry.gait for entry in table.gaits], model, jobs=jobs)
+    gaits = tuple(
+        TableGait.of_orbit(entry.name, orbit)
+        for entry, orbit in zip(table.gaits, orbits)
+        if not isinstance(orbit, NoAnswerError)
+        and orbit.largest_multiplier < 1
+        and abs(orbit.speed_m_s) > SLOWEST_M_S
+    )
+    if not gaits:
+        raise NoAnswerError(f"robot '{robot.name}' makes no way with any gait of '{table.robot_name}'")
+    return GaitTable(robot.name, robot.fingerprint(), model, gaits)

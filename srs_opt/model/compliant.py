@@ -1,0 +1,64 @@
+"""The compliant model: the bends q_i = l kappa_i are coordinates, driven through the bending stiffness.
+
+The actuators (13)-(15) give the no-load curvature kappa0; a segment answers with the bending moment
+
+    Q_i = (EI/l) [l kappa0_i - q_i + t_r (l kappa0_i' - q_i')],
+
+conjugate to q_i. EI is that of the chamber and the gap's spring in series, t_r the material's relaxation
+time. EI to infinity is the complex model (8).
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from srs_opt.model.complex import ComplexModel
+from srs_opt.model.parameters import Parameters
+
+
+class CompliantModel(ComplexModel):
+    """The complex model's bodies and ground with segments that bend under load.
+
+    Attributes
+    ----------
+    no_load, no_load_rate : SX (N-1, 1)
+        Curvature (1/m) that the actuators would give a segment without load, and its rate.
+    """
+
+    def __init__(self, parameters: Parameters) -> None:
+        super().__init__(parameters)
+        self.no_load = ca.SX.sym("no_load", self.links - 1)
+        self.no_load_rate = ca.SX.sym("no_load_rate", self.links - 1)
+
+    def stiffness(self) -> ca.SX:
+        """Return EI of a segment, N m^2: chamber and gap in series, 1/EI + L_o/(l EI_gap)."""
+        p = self.parameters
+        gap = self.gap_length / (p["segment_length_m"] * p["gap_stiffness_n_m2"])
+        return 1 / (1 / p["bending_stiffness_n_m2"] + gap)
+
+    def moment(self, kappa: ca.SX, dkappa: ca.SX, no_load: ca.SX, no_load_rate: ca.SX) -> ca.SX:
+        """Return the bending moments Q, N m, conjugate to l kappa, (N-1, 1)."""
+        relaxation = self.parameters["bending_relaxation_s"]
+        return self.stiffness() * (no_load - kappa + relaxation * (no_load_rate - dkappa))
+
+    def elastic_energy(self) -> ca.SX:
+        """Return the energy stored in the segments, J: sum l EI (kappa0 - kappa)^2 / 2."""
+        return (
+            self.parameters["segment_length_m"] * self.stiffness() * ca.sumsqr(self.no_load - self.kappa) / 2
+        )
+
+    def pressure_power(self) -> ca.SX:
+        """Return the power that the pressure puts in, W: sum Q l kappa0'."""
+        q = self.moment(self.kappa, self.dkappa, self.no_load, self.no_load_rate)
+        return self.parameters["segment_length_m"] * ca.dot(q, self.no_load_rate)
+
+    def material_loss(self) -> ca.SX:
+        """Return the power lost in the material, W: sum l EI t_r (kappa0' - kappa')^2."""
+        p = self.parameters
+        rate = ca.sumsqr(self.no_load_rate - self.dkappa)
+        return p["segment_length_m"] * self.stiffness() * p["bending_relaxation_s"] * rate
+
+    def kinetic_energy(self, velocity: ca.SX) -> ca.SX:
+        """Return the kinetic energy, J, for the body velocity (u_x, u_y, yaw momentum)."""
+        v = self.link_velocities(velocity[0], velocity[1], self.yaw_rate(velocity[2]))
+        return (ca.dot(self.mass, v.x**2 + v.y**2) + ca.dot(self.inertia, v.angle**2)) / 2

@@ -1,0 +1,50 @@
+"""Other stable orbits of the same gait: a soft body can run at one speed from rest, at another when rolling.
+
+There is no list of all orbits of a nonlinear system: the gait is started from several motions, and what they
+settle into is compared. Finding none is evidence, not proof.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from srs_opt.errors import NoAnswerError
+from srs_opt.orbit.actuators import periodic_actuators
+from srs_opt.orbit.solve import Cycle, reached_from
+from srs_opt.orbit.steady import Orbit, integrator, orbit_of
+from srs_opt.robot import Robot
+from srs_opt.simulate.together import together
+
+# forward speeds of the starts over body lengths per period; no snake of this kind reaches one
+STARTS = (-0.5, 0.25, 0.5, 0.75, 1.0)
+SAME_M_S = 2e-3  # orbits whose dynamic states differ by less are one (Newton closes them to 1e-9)
+
+
+def other_orbits(robot: Robot, orbit: Orbit, model: str | None = None) -> list[Orbit]:
+    """Return stable orbits of the same gait that rolling starts lead to and a standing start does not.
+
+    Parameters
+    ----------
+    orbit : Orbit
+        The one reached from rest (`srs_opt.orbit.steady.steady_gait`).
+
+    Returns
+    -------
+    list of Orbit
+        Fastest first; empty for models that prescribe the curvature, which have one orbit.
+    """
+    run, gait = integrator(robot, model), orbit.gait
+    if not run.structure.compliant:
+        return []
+    cycle = Cycle.of(run, gait)
+    bends = periodic_actuators(run, gait, cycle.p)[: 2 * robot.segments]
+    pace = robot.segments * robot.pitch_m / gait.period_s
+    starts = [np.concatenate([[share * pace, 0.0, 0.0], bends]) for share in STARTS]
+    found: list[Orbit] = []
+    for solution in together([reached_from(run, gait, start) for start in starts]):
+        if isinstance(solution, NoAnswerError):
+            continue
+        other = orbit_of(run, gait, solution)
+        if all(cycle.size(other.dynamic - known.dynamic) > SAME_M_S for known in (orbit, *found)):
+            found.append(other)
+    return sorted(found, key=lambda o: -o.speed_m_s)

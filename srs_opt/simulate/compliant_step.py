@@ -1,0 +1,195 @@
+"""One RODAS step of the compliant model, whose bends are coordinates.
+
+The equations of motion are kept implicit, g(Y, Y', Y'') = 0 (see `srs_opt.model.bending_chain`): RODAS is
+stiffly accurate and of full order for such equations of index 1, so no stage inverts the mass matrix. Of the
+stages' unknowns (places, velocities, accelerations) all but the velocities are eliminated, which leaves one
+matrix of order N + 2 per step, which is factorized in time linear in N (`srs_opt.model.chain_matrix`),
+
+    E = M - h gamma dg/dY' - (h gamma)^2 dg/dY.
+
+Accelerations are continuous (no-load curvature and its rate are, where valves switch) and found afresh at
+each step's start. Y stands in the axes of the robot's frame at the step's start.
+
+Source: E. Hairer and G. Wanner, Solving Ordinary Differential Equations II, VI.3-VI.4.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+
+from srs_opt.model.actuator import Actuator, ActuatorState
+from srs_opt.model.bending_chain import BendingChain, Drive
+from srs_opt.model.chain_derivatives import derivatives, mass_matrix
+from srs_opt.model.compliant import CompliantModel
+from srs_opt.model.parameters import Structure
+from srs_opt.model.registry import build, state_layout
+from srs_opt.model.state import BODY_STATES, POSE, VELOCITY, WORK
+from srs_opt.simulate.tableau import COUPLING, GAMMA, LEVER_M, NODES, STAGES, TIME_WEIGHTS
+
+
+@dataclass(frozen=True)
+class _Increment:
+    """A stage's increments of Y, Y', h Y'' and the friction work."""
+
+    place: ca.SX
+    velocity: ca.SX
+    acceleration: ca.SX
+    work: ca.SX
+
+    def vector(self) -> ca.SX:
+        return ca.vertcat(self.place, self.velocity, self.acceleration, self.work)
+
+
+def compliant_step(structure: Structure) -> ca.Function:
+    """Return ``step(x, valve, h, p) -> (x_next, error)``; see `srs_opt.simulate.rosenbrock.step_function`.
+
+    `error` is the embedded estimate of the links' velocities' local error, weighed by mass (rms), m/s.
+    """
+    parameters, model, actuator = build(structure)
+    assert isinstance(model, CompliantModel)
+    layout, p = state_layout(structure), parameters.vector
+    x = ca.SX.sym("x", layout.size)
+    valve, h = ca.SX.sym("valve", structure.segments), ca.SX.sym("h")
+    act = actuator.unstack(x[layout.actuator])
+    chain = BendingChain(model)
+    to_tail, to_body = _conversions(model)
+    y, dy = to_tail(x[VELOCITY], x[layout.kappa], x[layout.dkappa], p)
+    increments, error, end = _stages(chain, y, dy, x[POSE], actuator, act, valve, h)
+    n = chain.size
+    total = sum((i.vector() for i in increments[1:]), increments[0].vector())
+    y, dy = y + total[:n], dy + total[n : 2 * n]
+    moved, velocity, kappa, dkappa = to_body(y, dy, p)
+    c, s = ca.cos(x[2]), ca.sin(x[2])
+    pose = ca.vertcat(x[0] + c * moved[0] - s * moved[1], x[1] + s * moved[0] + c * moved[1], x[2] + moved[2])
+    shape_error = ca.SX(0)
+    if not actuator.linear:
+        half = actuator.advance(actuator.advance(act, valve, h / 2), valve, h / 2)
+        bend = parameters["segment_length_m"] * (half.dkappa - end.dkappa)
+        shape_error, end = ca.sumsqr(LEVER_M * bend), half
+    following = ca.vertcat(pose, velocity, x[WORK] + total[-1], kappa, dkappa, end.vector())
+    assert following.shape[0] == layout.size >= BODY_STATES
+    return ca.Function(
+        "step",
+        [x, valve, h, p],
+        [following, ca.sqrt(error + shape_error + 1e-30)],
+        ["x", "valve", "h", "p"],
+        ["x_next", "error"],
+        {"cse": True},
+    )
+
+
+def _stages(
+    chain: BendingChain,
+    y: ca.SX,
+    dy: ca.SX,
+    pose: ca.SX,
+    actuator: Actuator,
+    act: ActuatorState,
+    valve: ca.SX,
+    h: ca.SX,
+) -> tuple[list[_Increment], ca.SX, ActuatorState]:
+    """Return the weighted increments of a step, the squared error estimate and the actuators at its end."""
+    n, zero = chain.size, ca.SX.zeros(chain.size, 1)
+    shapes = {c: actuator.advance(act, valve, c * h) if c else act for c in sorted(set(NODES))}
+
+    def drive(at: ActuatorState) -> Drive:
+        return Drive(at.kappa, at.dkappa, pose)
+
+    start = drive(act)
+    rates = actuator.rates(act, valve)
+    force, power = chain.residual(y, dy, zero, start, ca.SX(1))
+    acceleration = mass_matrix(chain, y).solver()(force)
+    slopes = derivatives(chain, y, dy, acceleration, start)
+    acceleration = h * acceleration
+    in_time = chain.moment_rate(rates.kappa, rates.dkappa)
+    step = h * GAMMA
+    solve = slopes.mass.plus(slopes.by_rate, -step).plus(slopes.by_place, -(step**2)).solver()
+    k: list[_Increment] = []
+    last: tuple[float, ...] = (*STAGES[4], 1.0)
+    for i in range(6):
+        weights = STAGES[i] if i < 5 else last
+        at = _combined(weights, k, n)
+        if i:
+            residual, power = chain.residual(
+                y + at.place, dy + at.velocity, acceleration + at.acceleration, drive(shapes[NODES[i]]), h
+            )
+        else:
+            residual, power = zero, h * power
+        coupled = _combined(COUPLING[i], k, n)
+        r_place = h * (dy + at.velocity) + coupled.place
+        r_velocity = acceleration + at.acceleration + coupled.velocity
+        right = residual + h * h * TIME_WEIGHTS[i] * in_time
+        right += slopes.mass.times(r_velocity) + step * slopes.by_place.times(r_place)
+        velocity = solve(GAMMA * right)
+        place = GAMMA * (r_place + h * velocity)
+        work = power + coupled.work + h * (slopes.power_by_rate @ velocity + slopes.power_by_place @ place)
+        k.append(_Increment(place, velocity, velocity / GAMMA - r_velocity, GAMMA * work))
+    error = k[5].velocity
+    squared = error.T @ slopes.mass.times(error) / chain.model.total_mass()
+    return [_scaled(w, i) for w, i in zip((*last, 1.0), k)], squared, shapes[1.0]
+
+
+def _combined(weights: tuple[float, ...], k: list[_Increment], n: int) -> _Increment:
+    total = _Increment(ca.SX.zeros(n, 1), ca.SX.zeros(n, 1), ca.SX.zeros(n, 1), ca.SX(0))
+    for weight, increment in zip(weights, k):
+        part = _scaled(weight, increment)
+        total = _Increment(
+            total.place + part.place,
+            total.velocity + part.velocity,
+            total.acceleration + part.acceleration,
+            total.work + part.work,
+        )
+    return total
+
+
+def _scaled(weight: float, i: _Increment) -> _Increment:
+    return _Increment(weight * i.place, weight * i.velocity, weight * i.acceleration, weight * i.work)
+
+
+def _conversions(model: CompliantModel) -> tuple[ca.Function, ca.Function]:
+    """Return (velocity, kappa, dkappa, p) -> (Y, Y') and (Y, Y', p) -> (moved, velocity, kappa, dkappa).
+
+    Y stands in the robot's frame at the step's start; `moved` is the pose (3,) in that frame.
+    """
+    p = model.parameters.vector
+    kappa, dkappa, velocity = model.kappa, model.dkappa, ca.SX.sym("velocity", 3)
+    c, d, yaw_rate = model.chain, model.chain_rate, model.yaw_rate(velocity[2])
+    v = model.link_velocities(velocity[0], velocity[1], yaw_rate)
+    to_tail = ca.Function(
+        "to_tail",
+        [velocity, kappa, dkappa, p],
+        [ca.vertcat(c.x[0], c.y[0], c.angle), ca.vertcat(v.x[0], v.y[0], v.angle)],
+        {"cse": True},
+    )
+    w = ca.SX.sym("w")
+    body = ca.Function(
+        "body",
+        [kappa, dkappa, w, p],
+        [
+            ca.vertcat(c.x[0], c.y[0]),
+            ca.vertcat(d.x[0] - w * c.y[0], d.y[0] + w * c.x[0]),
+            model.yaw_inertia() * w + model.yaw_momentum_of_shape(),
+        ],
+        {"cse": True},
+    )
+    n = model.links
+    y, dy = ca.SX.sym("y", n + 2), ca.SX.sym("dy", n + 2)
+    chain = BendingChain(model)
+    bend, rate = chain.kappa(y), chain.kappa(dy)
+    turn, spin = ca.sum1(y[2:]) / n, ca.sum1(dy[2:]) / n
+    tail, tail_rate, momentum = body(bend, rate, spin, p)
+    cos, sin = ca.cos(turn), ca.sin(turn)
+    moved = ca.vertcat(
+        y[0] - cos * tail[0] + sin * tail[1],
+        y[1] - sin * tail[0] - cos * tail[1],
+        turn,
+    )
+    speed = ca.vertcat(
+        cos * dy[0] + sin * dy[1] - tail_rate[0],
+        cos * dy[1] - sin * dy[0] - tail_rate[1],
+        momentum,
+    )
+    to_body = ca.Function("to_body", [y, dy, p], [moved, speed, bend, rate], {"cse": True})
+    return to_tail, to_body
