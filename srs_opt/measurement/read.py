@@ -229,11 +229,12 @@ def _read_schedule(
             report.error(row.file, row.line, f"schedule: '{text[:60]}' {reason}")
             known[name] = None
         else:
-            known[name] = _parse_schedule(name, file, robot, report)
+            known[name] = parse_schedule(name, file, robot, report)
     return known[name]
 
 
-def _parse_schedule(name: str, file: str, robot: Robot, report: Report) -> Schedule | None:
+def parse_schedule(name: str, file: str, robot: Robot, report: Report) -> Schedule | None:
+    """Read one schedule; None (and a report) when it holds none."""
     rows = read_rows(file, SCHEDULE_COLUMNS, (), report)
     intervals, periods = [], set()
     for row in rows:

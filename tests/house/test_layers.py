@@ -79,7 +79,7 @@ def _for_types(node: ast.AST) -> bool:
 
 def is_command(module: str) -> bool:
     """Commands parse, call and print; they sit on top of everything."""
-    return module.endswith(".__main__") or module in ("planners.tour", "srs_opt.import_motive")
+    return module.endswith(".__main__") or module == "planners.tour"
 
 
 def layer(module: str) -> int:

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import importlib
+import subprocess
+import sys
+import tempfile
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -45,18 +48,12 @@ def read_c3d(path: Path, settings: ReadSettings) -> Take:
     head = read_bytes(path, "a C3D file", MOST_BYTES)[:2]
     if len(head) < 2 or head[1] != 0x50:
         raise InputError(f"{path}: not a C3D file (its second byte must be 0x50)")
-    library = _library("ezc3d", path)
-    try:
-        record = library.c3d(str(path))
-        values = np.asarray(record["data"]["points"], dtype=float)
-        point = record["parameters"]["POINT"]
-        labels = tuple(str(name).strip() for name in point.get("LABELS", {}).get("value", []))
-        rate = float(record["header"]["points"]["frame_rate"])
-        first = int(record["header"]["points"]["first_frame"])
-        units = str(next(iter(point.get("UNITS", {}).get("value", [])), "")).strip()
-    except Exception as error:  # a library in C++: whatever it raises, the file is at fault
-        raise InputError(f"{path}: cannot be read as a C3D file: {error}") from error
-    points = values[:3].transpose(2, 1, 0)
+    _library("ezc3d", path)
+    record = _by_child(path)
+    values, labels = record["points"], tuple(str(name) for name in record["labels"])
+    rate, first = float(record["rate"]), int(record["first"])
+    units = str(record["units"]).strip()
+    points = np.asarray(values, dtype=float).transpose(2, 1, 0)
     if not points.size:
         raise InputError(f"{path}: holds no points")
     told: list[str] = []
@@ -75,6 +72,33 @@ def read_c3d(path: Path, settings: ReadSettings) -> Take:
         scale_m=settings.scale_m or (unit_scale(path, 1, units) if units else None),
         told=tuple(told),
     )
+
+
+# ezc3d ends the process on some damaged files, so a child process reads
+_CHILD = """
+import sys, ezc3d, numpy
+r = ezc3d.c3d(sys.argv[1])
+p, h = r["parameters"]["POINT"], r["header"]["points"]
+text = lambda key: [str(v).strip() for v in p.get(key, {}).get("value", [])]
+numpy.savez(sys.argv[2], points=r["data"]["points"][:3], labels=numpy.array(text("LABELS"), dtype=str),
+            rate=h["frame_rate"], first=h["first_frame"], units=(text("UNITS") or [""])[0])
+"""
+_PATIENCE_S = 120
+
+
+def _by_child(path: Path) -> dict[str, Any]:
+    with tempfile.TemporaryDirectory() as folder:
+        made = Path(folder) / "points.npz"
+        command = [sys.executable, "-c", _CHILD, str(path.resolve()), str(made)]
+        try:
+            done = subprocess.run(command, capture_output=True, timeout=_PATIENCE_S, check=False, text=True)
+        except subprocess.TimeoutExpired as error:
+            raise InputError(f"{path}: reading the C3D file takes over {_PATIENCE_S} s: damaged?") from error
+        if done.returncode != 0 or not made.is_file():
+            words = (done.stderr.strip().splitlines() or ["ezc3d ended on it"])[-1]
+            raise InputError(f"{path}: cannot be read as a C3D file: {words[:200]}")
+        with np.load(made, allow_pickle=False) as record:
+            return dict(record)
 
 
 def is_deeplabcut(head: str) -> bool:
@@ -171,5 +195,6 @@ def _video_take(
         marker_positions=on_clock(points, places, len(time)),
         scale_m=settings.scale_m,
         flat=True,
+        pixels=True,
         told=tuple(told),
     )

@@ -19,7 +19,9 @@ _TIME = ("t", "time", "timestamp", "zeit", "temps", "elapsed", "seconds")
 _FRAME = ("frame", "frame#", "frames", "frame number", "framenumber", "index", "sample")
 _AXIS_LAST = re.compile(r"^(.*?)[\s_.:/-]*(?<![A-Za-z])?(?:p|pos)?([xyz])$", re.IGNORECASE)
 _AXIS_FIRST = re.compile(r"^([xyz])[\s_.:/-]*(.*)$", re.IGNORECASE)
-_ROTATION = re.compile(r"(?:^|[\s_.:/-])(?:q[xyzw0-3]|q|quat\w*|rot\w*|[xyz]?orient\w*)(?:[\s_.:/-]|$)", re.IGNORECASE)
+_ROTATION = re.compile(
+    r"(?:^|[\s_.:/-])(?:q[xyzw0-3]|q|quat\w*|rot\w*|[xyz]?orient\w*)(?:[\s_.:/-]|$)", re.IGNORECASE
+)
 
 
 @dataclass
@@ -31,6 +33,7 @@ class _Layout:
     time_scale: float = 1.0
     scale_m: float | None = None
     y_down: bool = False
+    pixels: bool = False
     markers: dict[str, dict[str, int]] = field(default_factory=dict)
 
 
@@ -71,7 +74,9 @@ def read_columns(path: Path, settings: ReadSettings) -> Take:
     told = list(sheet.told)
     first = _first_row(sheet)
     if first == 0:
-        raise InputError(f"{path}:{sheet.rows[0][0]}: the table has no headings (expected time and x, y columns)")
+        raise InputError(
+            f"{path}:{sheet.rows[0][0]}: the table has no headings (expected time and x, y columns)"
+        )
     line, header = sheet.rows[first - 1]
     header = tuple(name.strip('"') for name in header)
     layout = (
@@ -100,6 +105,7 @@ def read_columns(path: Path, settings: ReadSettings) -> Take:
         markers=names,
         marker_positions=on_clock(points, places, len(clock)),
         scale_m=settings.scale_m or layout.scale_m,
+        pixels=layout.pixels or layout.y_down,
         flat=all("z" not in c for c in layout.markers.values()),
         told=tuple(told),
     )
@@ -162,12 +168,15 @@ def _inferred(path: Path, line: int, header: tuple[str, ...], told: list[str]) -
             others.append(heading)
     layout.markers = {name: c for name, c in layout.markers.items() if len(c) > 1}
     if not layout.markers:
-        raise InputError(f"{path}:{line}: no two columns are named x and y of a marker; say which with --columns")
+        raise InputError(
+            f"{path}:{line}: no two columns are named x and y of a marker; say which with --columns"
+        )
     units.discard("")
     if len(units) > 1 or not units <= {*UNITS, "px", "pixel", "pixels"}:
         raise InputError(f"{path}:{line}: unknown or mixed length units {', '.join(sorted(units))[:60]}")
     unit = next(iter(units), "")
     layout.scale_m = UNITS.get(unit)
+    layout.pixels = unit.startswith("p")
     if others:
         told.append(f"columns left out: {', '.join(others)[:120]}")
     return layout

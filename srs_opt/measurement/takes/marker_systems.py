@@ -138,7 +138,7 @@ def read_vicon(path: Path, settings: ReadSettings) -> Take:
         last += 1
     part = Sheet(path, rows[:last], sheet.separator, sheet.decimal, sheet.told)
     points = part.numbers(first, [k + j for k in starts for j in range(3)]).reshape(-1, len(starts), 3)
-    number = part.numbers(first, [0])[:, 0]
+    number = part.numbers(first, [0])[:, 0] - 1  # Nexus counts frames from 1
     frames = Frames(None, number, [line for line, _ in rows[first:last]])
     rate, time, places = even_clock(path, frames, rate, told)
     return Take(

@@ -1,4 +1,4 @@
-"""OptiTrack Motive's CSV exports: header rows above columns per marker (1.2x), and one row per frame (1.1)."""
+"""OptiTrack Motive's CSV exports: columns per marker (1.2x), or the markers seen, row by row (1.1)."""
 
 from __future__ import annotations
 
@@ -68,6 +68,9 @@ def read_motive(path: Path, settings: ReadSettings) -> Take:
 def _read_columns(sheet: Sheet, settings: ReadSettings) -> Take:
     path, told = sheet.path, list(sheet.told)
     facts = _facts(sheet.rows[0][1])
+    scale = settings.scale_m
+    if scale is None and "length units" in facts:
+        scale = unit_scale(path, 1, facts["length units"])
     header = next((i for i, (_, cells) in enumerate(sheet.rows) if cells[0].lower() == "frame"), None)
     if header is None:
         raise InputError(f"{path}: there is no line that starts with 'Frame'")
@@ -77,10 +80,10 @@ def _read_columns(sheet: Sheet, settings: ReadSettings) -> Take:
     found = _columns(path, [cells for _, cells in sheet.rows[1 : header + 1]], line)
     for number, cells in sheet.rows[header + 1 :]:
         if len(cells) > len(axes) and any(cells[len(axes) :]):
-            raise InputError(
-                f"{path}:{number}: {len(cells)} cells where the header has {len(axes)} columns"
-            )
-    clock = next((i for i, c in enumerate(axes) if c.lower().startswith("time") and "code" not in c.lower()), 1)
+            raise InputError(f"{path}:{number}: {len(cells)} cells where the header has {len(axes)} columns")
+    clock = next(
+        (i for i, c in enumerate(axes) if c.lower().startswith("time") and "code" not in c.lower()), 1
+    )
     values = sheet.numbers(header + 1, [0, clock])
     lines = [number for number, _ in sheet.rows[header + 1 :]]
     rate, time, places = even_clock(
@@ -88,9 +91,6 @@ def _read_columns(sheet: Sheet, settings: ReadSettings) -> Take:
     )
     markers = _unique([c for c in found if c.type in MARKER_TYPES])
     bodies = _unique([c for c in found if c.type in BODY_TYPES])
-    scale = settings.scale_m
-    if scale is None and "length units" in facts:
-        scale = unit_scale(path, 1, facts["length units"])
     return Take(
         source=path,
         name=facts.get("take name") or path.stem,
@@ -153,9 +153,7 @@ def _columns(path: Path, header: list[tuple[str, ...]], line: int) -> list[_Colu
         places = {cell(kinds, column + i).lower() for i in range(3)}
         if triple == AXES and places == {"position"}:
             found.append(
-                _Column(
-                    cell(types, column).lower(), cell(names, column), (column, column + 1, column + 2)
-                )
+                _Column(cell(types, column).lower(), cell(names, column), (column, column + 1, column + 2))
             )
     if not found:
         raise InputError(f"{path}:{line}: no column holds positions X, Y, Z")
@@ -179,7 +177,7 @@ def _positions(sheet: Sheet, first: int, columns: list[_Column]) -> Array:
 
 
 def _read_rows(sheet: Sheet, settings: ReadSettings) -> Take:
-    """Read format 1.1: ``frame, number, time, bodies, (11 values each), markers, (x, y, z, id, name each)``."""
+    """Read format 1.1: ``frame, number, time, bodies (11 values each), markers (x, y, z, id, name each)``."""
     path, told = sheet.path, list(sheet.told)
     rows = [(line, cells) for line, cells in sheet.rows if cells[0].lower() == "frame"]
     if not rows:
@@ -232,5 +230,7 @@ def _value(path: Path, line: int, cells: tuple[str, ...], k: int, decimal: str) 
 def _count(path: Path, line: int, cells: tuple[str, ...], k: int, decimal: str) -> int:
     value = _value(path, line, cells, k, decimal)
     if not (0 <= value <= len(cells)) or value != int(value):
-        raise InputError(f"{path}:{line}: expected a number of markers or bodies, found '{printable(cells[k])}'")
+        raise InputError(
+            f"{path}:{line}: expected a number of markers or bodies, found '{printable(cells[k])}'"
+        )
     return int(value)

@@ -87,7 +87,9 @@ def decode(data: bytes) -> tuple[str, str]:
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return data.decode("utf-16", errors="replace"), ""
     sample = data[:400]
-    if len(sample) > 3 and (sample[1::2].count(0) > len(sample) / 4 or sample[::2].count(0) > len(sample) / 4):
+    if len(sample) > 3 and (
+        sample[1::2].count(0) > len(sample) / 4 or sample[::2].count(0) > len(sample) / 4
+    ):
         little = sample[1::2].count(0) >= sample[::2].count(0)
         return data.decode("utf-16-le" if little else "utf-16-be", errors="replace"), "UTF-16"
     try:
@@ -130,8 +132,11 @@ def _rows(text: str, separator: str) -> list[tuple[int, tuple[str, ...]]]:
     if separator == " ":
         lines = ((i, tuple(line.split())) for i, line in enumerate(text.split("\n"), start=1))
         return [(i, cells) for i, cells in lines if cells]
-    quoting = csv.QUOTE_NONE if separator == "\t" else csv.QUOTE_MINIMAL
-    reader = csv.reader(io.StringIO(text, newline=""), delimiter=separator, quoting=quoting)
+    stream = io.StringIO(text, newline="")
+    if separator == "\t":  # names may hold quotation marks there
+        reader = csv.reader(stream, delimiter=separator, quoting=csv.QUOTE_NONE)
+    else:
+        reader = csv.reader(stream, delimiter=separator)
     return [
         (reader.line_num, tuple(cell.strip() for cell in cells))
         for cells in reader

@@ -49,6 +49,8 @@ class Take:
         Metres per unit of the positions; None when the file does not tell.
     flat : bool
         Whether the system sees a plane only (then z = 0).
+    pixels : bool
+        Whether the positions are those of a picture, whose scale cannot be guessed.
     told : tuple of str
         What the reader had to guess or to leave out.
     """
@@ -63,6 +65,7 @@ class Take:
     body_positions: Array | None = None
     scale_m: float | None = 1.0
     flat: bool = False
+    pixels: bool = False
     told: tuple[str, ...] = ()
 
 
