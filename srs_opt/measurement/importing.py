@@ -200,8 +200,8 @@ def import_trial(
     seen, usual = int(counts.sum()), int(np.median(counts[counts > 0]))
     if usual > chain.links:
         raise InputError(
-            f"{source.source}: most frames show {usual} positions, the robot has {chain.links} links: one marker "
-            "on the centre of every link is needed; leave the others out (a table: --columns)"
+            f"{source.source}: most frames show {usual} positions, the robot has {chain.links} links: one "
+            "marker on the centre of every link is needed; leave the others out (a table: --columns)"
         )
     frame, order = found
     owners = follow(chain, cloud, frame, order)
