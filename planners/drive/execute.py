@@ -225,7 +225,7 @@ class Drive:
     def _room_m(self, state: Array, gait: int) -> float:
         """Return the least clearance over a cycle with any friction that the robot may have."""
         timeline = self.problem.joints.timeline(self.before, gait)
-        return self.foresight.least_room_m(state, timeline, 0.0)
+        return self.foresight.least_room_m(state, timeline, 0.0, (self.before, gait))
 
     def _gait_by_plan(self, state: Array) -> int | None:
         """Return the gait that the plan plays next, if the robot is as the plan has it after a cycle."""
@@ -268,12 +268,12 @@ class Drive:
         self.state = self.plant.state
         self.played.append(index)
         self.starts_s.append(start_s)
-        self.before = index
+        gait_before, self.before = self.before, index
         if self.watch.touched:
             return "contact"
         if arrived:
             return "arrived"
-        self.foresight.learn(before, cycle, self.state)
+        self.foresight.learn(before, cycle, self.state, (gait_before, index))
         c, s = math.cos(begin[2]), math.sin(begin[2])
         dx, dy, turn = self.state[:3] - begin
         observed = np.array([c * dx + s * dy, c * dy - s * dx, turn])

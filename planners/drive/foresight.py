@@ -23,6 +23,7 @@ from srs_opt.simulate.timeline import Timeline
 from srs_opt.simulate.together import together
 
 Array = NDArray[np.float64]
+Cycle = tuple[int, int]  # gait before, gait
 # friction along and across the wheels, over the planned robot's; a hose that drags is felt along the wheels
 FRICTIONS = ((1.0, 1.0), (0.8, 0.8), (1.2, 1.2), (0.8, 1.0), (1.25, 1.0), (1.5, 1.0), (2.0, 1.0))
 # bending stiffness over the planned one of a soft robot whose file gives no deviation; N m^2 for a rigid plan
@@ -76,11 +77,20 @@ class Foresight:
         best = int(self._misses.argmin())
         return FRICTIONS[best] if best < len(FRICTIONS) else FRICTIONS[0]
 
-    def learn(self, before: Array, timeline: Timeline, after: Array) -> None:
-        """Take in one cycle: the state it began with and the state it ended with."""
+    def learn(self, before: Array, timeline: Timeline, after: Array, cycle: Cycle | None = None) -> None:
+        """Take in one cycle: the state it began with and the state it ended with.
+
+        Measured factors bend what is foreseen of a cycle (gait before, gait), here and below.
+        """
         foreseen = together([run.travel(timeline, self._begun(run, before)) for run in self._runs])
-        misses = [_miss(outcome, after) for outcome in foreseen]
-        self._seen = FADING * self._seen + misses
+        bent = [
+            outcome if isinstance(outcome, NoAnswerError) else self._bent(outcome, cycle)
+            for outcome in foreseen
+        ]
+        self._seen = FADING * self._seen + [_miss(outcome, after) for outcome in bent]
+
+    def _bent(self, trajectory: Trajectory, cycle: Cycle | None) -> Trajectory:
+        return trajectory if cycle is None else self.problem.bent(trajectory, *cycle)
 
     def _begun(self, run: Integrator, state: Array) -> Array:
         """Return the planned robot's state as a suspect's model has it."""
@@ -88,27 +98,31 @@ class Foresight:
             return state
         return run.layout.adopt(state, self.problem.run.layout)
 
-    def room_m(self, state: Array, timeline: Timeline, suspect: int | None = None) -> float:
+    def room_m(
+        self, state: Array, timeline: Timeline, suspect: int | None = None, cycle: Cycle | None = None
+    ) -> float:
         """Return the smallest clearance with the likeliest suspect, or another (FRICTIONS come first).
 
         Minus infinity where the model cannot go on.
         """
         run = self._runs[int(self._misses.argmin()) if suspect is None else suspect]
         try:
-            trajectory = run.run(timeline, self._begun(run, state))
+            trajectory = self._bent(run.run(timeline, self._begun(run, state)), cycle)
         except NoAnswerError:
             return -math.inf
         watch = BodyWatch(self.problem, self.problem.robot, run)
         watch.look(trajectory.time_s, trajectory.pose, trajectory.kappa, ends=False)
         return watch.smallest_m
 
-    def least_room_m(self, state: Array, timeline: Timeline, worth_m: float = -math.inf) -> float:
+    def least_room_m(
+        self, state: Array, timeline: Timeline, worth_m: float = -math.inf, cycle: Cycle | None = None
+    ) -> float:
         """Return the smallest clearance with any suspect; given up at one that leaves at most `worth_m`."""
         least_m = math.inf
         possible = self._misses <= PLAUSIBLE + TIMES * self._misses.min()
         for suspect in np.argsort(self._misses, kind="stable"):
             if possible[suspect]:
-                least_m = min(least_m, self.room_m(state, timeline, int(suspect)))
+                least_m = min(least_m, self.room_m(state, timeline, int(suspect), cycle))
             if least_m <= worth_m:
                 break
         return least_m

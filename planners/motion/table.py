@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from planners.motion.bending import Bending
 from planners.motion.valves import Joints
 
 SAMPLES = 16  # intervals per cycle at which pose and body are kept
@@ -89,6 +90,14 @@ class MotionTable:
         tables = self.pose[before, now], self.speed_after_m_s[before, now]
         local, after = ((1 - weight) * t[low] + weight * t[low + 1] for t in tables)
         return placed(local, x, y, heading), float(after)
+
+    def bent(self, bending: Bending) -> MotionTable:
+        """Return the table with measured factors on all its cycles."""
+        swing = self.course[None, :-1] - self.course[:, None]
+        share = np.linspace(0.0, 1.0, SAMPLES + 1)
+        pose = np.stack([bending.local(row, s[:, None], share) for row, s in zip(self.pose, swing)])
+        steady = np.array([bending.calibration.displacement(d) for d in self.steady])
+        return replace(self, pose=pose.astype(np.float32), steady=steady)
 
     def _level(self, before: int, speed_m_s: float) -> tuple[int, float]:
         levels = self.speed_m_s[before]

@@ -78,7 +78,8 @@ def add_planning_options(parser: Parser) -> None:
         "--drive",
         type=Path,
         metavar="FILE",
-        help="drive.json of a drive calibrated by measurements: its uncertainty widens the margin",
+        help="drive.json of a drive calibrated by measured maps: its factors bend every cycle, its "
+        "uncertainty is room that every cycle keeps",
     )
     parser.add_argument(
         "--min-dwell",

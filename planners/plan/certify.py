@@ -4,10 +4,11 @@ Nothing of the search is used but the order of its gaits: the model is integrate
 at every node of that integration the body's capsules are measured against the walls themselves.
 
 The integration's own error is bounded and taken off. The plan is integrated with two tolerances a factor
-FINER apart; the finer integration errs twenty to a hundred times less, so that a quarter of the distance
-between the two bounds its error with room to spare (Richardson). The largest distance so far counts, since
-an error may pass through zero. A heading that is off moves the body by its lever arm, and so the bound grows
-with the way as the error does. Where it is above a tenth of the clearance the tolerance is tightened.
+FINER apart, and with ramps of pressure whose error is as much apart; the finer integration errs fifteen to a
+hundred times less, so that a quarter of the distance between the two bounds its error with room to spare
+(Richardson). The largest distance so far counts, since an error may pass through zero. A heading that is off
+moves the body by its lever arm, and so the bound grows with the way as the error does. Where it is above a
+tenth of the clearance the tolerance is tightened.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planners.motion.table import body_in_room
+from planners.motion.valves import STAIR_S
 from planners.search.problem import ROUNDING_M, Problem
 from planners.search.tree import Root, arrival_index, at_rest
 from srs_opt.model.outline import POINTS_PER_ARC
@@ -29,7 +31,7 @@ Array = NDArray[np.float64]
 TOLERANCE_M_S = 1e-5  # of the coarsest integration: half a metre per second errs by 0.1 mm in ten metres
 FINER = 16.0  # twice as many steps
 LEVELS = 5  # tolerances at most; the last errs by a micrometre in a hundred metres
-RATIO = 4.0  # of the errors of two levels at least; 21 to 113 was seen over 94 m. 2 would double the bound
+RATIO = 4.0  # of the errors of two levels at least; 15 to 113 was seen over 94 m. 2 would double the bound
 SHARE = 0.1  # of the clearance, that the bound may be
 EXACT_BELOW_M = 0.03  # of clearance; above, the table's lower bound will do
 
@@ -121,8 +123,9 @@ class Certifier:
         state = cycles[-1].final if cycles else self.root.state
         before = gaits[same - 1] if same else self.root.gait
         for gait in gaits[same:]:
-            timeline = self.problem.joints.timeline(before, gait)
-            cycles.append(self.problem.run.run(timeline, state, TOLERANCE_M_S / FINER**level))
+            timeline = self.problem.joints.timeline(before, gait, STAIR_S / FINER ** (level / 2))
+            played = self.problem.run.run(timeline, state, TOLERANCE_M_S / FINER**level)
+            cycles.append(self.problem.bent(played, before, gait))
             before, state = gait, cycles[-1].final
         self._known[level] = _Played(list(gaits), cycles)
         return cycles
@@ -146,7 +149,8 @@ class Certifier:
         unseen += _sagitta(problem, kappa)
         between = float((room - unseen).min())
         # the start may be as near as it likes: nothing can be asked of it that integration could lose
-        wanted = problem.margin_m + np.where(cycle == 0, root.slack_m - error, -ROUNDING_M)
+        tube = np.concatenate([problem.bending.tube_m(pose[cycle == k]) for k in np.unique(cycle)])
+        wanted = problem.margin_m + np.where(cycle == 0, root.slack_m - error, tube - ROUNDING_M)
         close = room < wanted
         failed = int(cycle[close.argmax()]) if close.any() else None
         reason = ""

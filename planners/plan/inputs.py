@@ -8,11 +8,12 @@ from planners.maze.load import load_maze
 from planners.maze.maze import Maze
 from planners.maze.placement import check_placement
 from planners.maze.places import RobotSize
+from planners.motion.bending import Bending
 from planners.motion.store import load_motion
 from planners.motion.valves import ValveLimits, playable
 from planners.search.problem import Problem
 from srs_opt.command import chosen_model, progress, say
-from srs_opt.drive.calibration import load_calibration
+from srs_opt.drive.calibration import NO_CALIBRATION, load_calibration
 from srs_opt.errors import InputError
 from srs_opt.gait_opt.table import GaitTable, load_table
 from srs_opt.model.parameters import room_effects
@@ -39,18 +40,15 @@ def problem_from(options: argparse.Namespace) -> Problem:
     motion = load_motion(
         robot, gaits, limits, lambda rows: progress(rows, options, "changes of gait (once per gait table)")
     )
-    margin_m = options.margin + drive_margin_m(options, gaits)
-    return Problem(robot, gaits, motion, maze, margin_m, options.cost)
-
-
-def drive_margin_m(options: argparse.Namespace, gaits: GaitTable) -> float:
-    """Return the clearance that a calibrated drive's uncertainty costs, corrected every cycle."""
-    if options.drive is None:
-        return 0.0
-    longest_m = max(abs(entry.speed_m_s) * entry.gait.period_s for entry in gaits.gaits)
-    margin_m = load_calibration(options.drive).margin_m(longest_m)
-    say(options, f"note: the measured drive is uncertain; {1e3 * margin_m:.1f} mm more are kept from walls")
-    return margin_m
+    drive = NO_CALIBRATION if options.drive is None else load_calibration(options.drive)
+    if options.drive is not None:
+        motion = motion.bent(Bending(drive, motion.course))
+        say(
+            options,
+            f"note: cycles as measured: speed times {drive.speed.value:.3f}, radius times "
+            f"{drive.radius.value:.3f}, uncertain by {1e3 * drive.margin_m(1.0):.1f} mm per metre",
+        )
+    return Problem(robot, gaits, motion, maze, options.margin, options.cost, drive)
 
 
 def maze_from(options: argparse.Namespace, robot: Robot) -> Maze:

@@ -172,7 +172,7 @@ class BeamSearch:
         if self._cheapest.get(key, math.inf) <= offer.spent:
             return None
         slack = self.root_slack_m if offer.parent == 0 else s.slack_m
-        if not self.problem.body.keeps_margin(cycle.lines, slack):
+        if not self.problem.body.keeps_margin(cycle.lines, slack + (cycle.tube_m if offer.parent else 0.0)):
             return None
         self._cheapest[key] = offer.spent
         node = self._tree.add(offer.parent, offer.gait, offer.spent, cycle)

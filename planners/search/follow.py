@@ -45,7 +45,7 @@ def follow(problem: Problem, reference: Reference) -> list[Step] | None:
         where = Where(state[:3], gait, float(state[3]))
         choice = choose(problem, reference, where, Learned(), node)
         cycle = problem.simulate(state, gait, choice.gait)
-        slack = problem.start_slack_m if not steps else 0.0
+        slack = cycle.tube_m if steps else problem.start_slack_m
         if not problem.body.keeps_margin(cycle.lines, slack):
             return None
         steps.append(Step(choice.gait, cycle))

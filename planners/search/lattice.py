@@ -107,7 +107,7 @@ class LatticeSearch:
             return None
         # the start may be as near to a wall as it likes; no cycle may bring the body nearer than that
         slack = self.root_slack_m if parent == 0 else self.settings.slack_m
-        if not self.problem.body.keeps_margin(cycle.lines, slack):
+        if not self.problem.body.keeps_margin(cycle.lines, slack + (cycle.tube_m if parent else 0.0)):
             return None
         self._closed.add(key)
         return self._tree.add(parent, gait, spent, cycle)

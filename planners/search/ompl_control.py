@@ -137,7 +137,7 @@ def _play(problem: Problem, memory: _Memory, number: int, gait: int) -> int:
     if not problem.motion.allowed[before, gait]:
         return -1
     cycle = problem.simulate(memory.cycle[number].state, before, gait)
-    slack = problem.start_slack_m if number == 0 else SLACK_M
+    slack = problem.start_slack_m if number == 0 else SLACK_M + cycle.tube_m
     if not problem.body.keeps_margin(cycle.lines, slack):
         return -1
     memory.cycle.append(cycle)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from planners.maze.field import DistanceField
 from planners.maze.maze import Maze
 from planners.maze.places import Goal, Pose, RobotSize
+from planners.motion.bending import Bending
 from planners.motion.cycles import CycleRun
 from planners.motion.robots import undelayed
 from planners.motion.table import MotionTable, body_in_room
@@ -19,11 +20,12 @@ from planners.motion.valves import Joints
 from planners.search.clearance import BodyClearance
 from planners.search.costmap import CostMap, cost_map
 from planners.search.price import Price, Tariff
+from srs_opt.drive.calibration import NO_CALIBRATION, DriveCalibration
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait_opt.table import GaitTable
 from srs_opt.orbit.steady import integrator
 from srs_opt.robot import Robot
-from srs_opt.simulate.integrate import Integrator
+from srs_opt.simulate.integrate import Integrator, Trajectory
 from srs_opt.simulate.shapes import centre_lines
 from srs_opt.simulate.together import together
 
@@ -43,11 +45,14 @@ class Cycle:
     pose : array (SAMPLES + 1, 3)
     lines : array (SAMPLES + 1, points, 2)
         Centre line of the body in the room.
+    tube_m : float
+        How far its end may be from where it is said to be, when it is measured where it begins.
     """
 
     state: Array
     pose: Array
     lines: Array
+    tube_m: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +69,8 @@ class Problem:
     margin_m : float
     price : {"time", "length", "clearance", "air"}
         What shall be small.
+    drive : DriveCalibration
+        Measured factors; `motion` is bent by them already (`MotionTable.bent`).
     """
 
     robot: Robot
@@ -72,6 +79,7 @@ class Problem:
     maze: Maze
     margin_m: float
     price: Price = "time"
+    drive: DriveCalibration = NO_CALIBRATION
 
     def __getstate__(self) -> dict[str, object]:
         """Only what was given goes to other processes: what was worked out may hold compiled code."""
@@ -126,6 +134,11 @@ class Problem:
         """The dynamic model, without effects that know the room and without the valves' delay."""
         return integrator(undelayed(self.robot), self.gaits.model)
 
+    @cached_property
+    def bending(self) -> Bending:
+        """What measured factors do to a cycle of the model."""
+        return Bending(self.drive, self.motion.course)
+
     @property
     def joints(self) -> Joints:
         """How the valves play a cycle after another."""
@@ -149,6 +162,14 @@ class Problem:
         """
         return self.run.layout.adopt(state, (run or self.run).layout)
 
+    def bent(self, trajectory: Trajectory, before: int, gait: int) -> Trajectory:
+        """Return the model's trajectory of one cycle as measured factors have it."""
+        if self.bending.none:
+            return trajectory
+        share = trajectory.time_s / trajectory.time_s[-1]
+        pose = self.bending.placed(trajectory.pose, before, gait, share)
+        return replace(trajectory, pose=pose, final=np.concatenate([pose[-1], trajectory.final[3:]]))
+
     def simulate(self, state: Array, before: int, gait: int) -> Cycle:
         """Return one cycle of a gait from a state of the model, after a cycle of another (or rest)."""
         (cycle,) = self.simulate_all([(state, before, gait)])
@@ -162,17 +183,26 @@ class Problem:
         The company makes no difference to a cycle; None stands for one that the model cannot go through.
         """
         found = together([self._cycle(before, gait)(state) for state, before, gait in begins])
-        went = [outcome for outcome in found if not isinstance(outcome, NoAnswerError)]
+        went = [
+            (before, gait, outcome)
+            for (_, before, gait), outcome in zip(begins, found)
+            if not isinstance(outcome, NoAnswerError)
+        ]
         cycles = iter(self._kept(went))
         return [None if isinstance(outcome, NoAnswerError) else next(cycles) for outcome in found]
 
-    def _kept(self, went: list[tuple[Array, Array]]) -> list[Cycle]:
-        """Return the cycles of last states and samples (SAMPLES + 1, nx)."""
+    def _kept(self, went: list[tuple[int, int, tuple[Array, Array]]]) -> list[Cycle]:
+        """Return the cycles of gaits before, gaits, last states and samples (SAMPLES + 1, nx)."""
         if not went:
             return []
-        samples = np.stack([sampled for _, sampled in went])
+        samples = np.stack([sampled for *_, (_, sampled) in went])
         curved = samples[..., self.run.layout.kappa]
         lines = centre_lines(self.run, curved.reshape(-1, curved.shape[-1]))
-        pose = samples[..., :3]
+        share = np.linspace(0.0, 1.0, samples.shape[1])
+        pose = np.stack([self.bending.placed(p, b, g, share) for (b, g, _), p in zip(went, samples[..., :3])])
         placed = body_in_room(lines.reshape(*curved.shape[:-1], *lines.shape[1:]), pose)
-        return [Cycle(last, *kept) for (last, _), *kept in zip(went, pose, placed)]
+        cycles = []
+        for (*_, (last, _)), poses, body in zip(went, pose, placed):
+            state = last if self.bending.none else np.concatenate([poses[-1], last[3:]])
+            cycles.append(Cycle(state, poses, body, float(self.bending.tube_m(poses)[-1])))
+        return cycles

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from srs_opt.model.compliant import CompliantModel
-from srs_opt.model.kinematics import Chain, segment_chord
+from srs_opt.model.kinematics import Chain, segment_chord, straight_gap_chord
 from srs_opt.model.mechanics import Forces
 
 Vector = tuple[ca.SX, ca.SX]
@@ -73,13 +73,15 @@ class BendingChain:
         p = model.parameters
         self.turn_per_kappa = p["segment_length_m"] + model.gap_length * model.gap_ratio
         kappa = ca.SX.sym("kappa")
-        length, slope, cos, sin = segment_chord(
-            kappa, p["segment_length_m"], model.gap_length, model.gap_ratio
-        )
+        l, gap = p["segment_length_m"], model.gap_length
+        if ca.SX(model.gap_ratio).is_zero():
+            jet, cos, sin = straight_gap_chord(kappa, l, gap)
+        else:
+            length, slope, cos, sin = segment_chord(kappa, l, gap, model.gap_ratio)
+            second = ca.jacobian(slope, kappa)
+            jet = length, slope, second, ca.jacobian(second, kappa)
         by_turn = 1 / self.turn_per_kappa
-        jet = [length, slope * by_turn]
-        for _ in range(2):
-            jet.append(ca.jacobian(jet[-1], kappa) * by_turn)
+        jet = tuple(derivative * by_turn**order for order, derivative in enumerate(jet))
         self._chord = ca.Function("chord", [kappa, p.vector], [*jet, cos, sin], {"cse": True})
 
     def kappa(self, y: ca.SX) -> ca.SX:

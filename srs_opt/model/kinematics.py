@@ -19,6 +19,9 @@ _SERIES_RADIUS = 0.3  # below it the Taylor series of sinc is exact to rounding
 # Taylor coefficients in h^2 of sin(h)/h and of its derivative over h
 _SINC = tuple((-1) ** k / math.factorial(2 * k + 1) for k in range(7))
 _SLOPE = tuple((-1) ** k * 2 * k / math.factorial(2 * k + 1) for k in range(1, 8))
+# of (sin(h)/h)'' in h^2, and of (sin(h)/h)''' over h
+_SECOND = tuple((-1) ** k * 2 * k * (2 * k - 1) / math.factorial(2 * k + 1) for k in range(1, 8))
+_THIRD = tuple((-1) ** k * 2 * k * (2 * k - 1) * (2 * k - 2) / math.factorial(2 * k + 1) for k in range(2, 9))
 
 
 def _polynomial(coefficients: tuple[float, ...], z: ca.SX) -> ca.SX:
@@ -109,6 +112,31 @@ def segment_chord(
         bend * gap_slope * middle_cos - (half + bend) * gap_chord * middle_sin
     )
     return chord, slope, cos, sin
+
+
+def straight_gap_chord(
+    kappa: ca.SX, segment_length: ca.SX, gap_length: ca.SX
+) -> tuple[tuple[ca.SX, ca.SX, ca.SX, ca.SX], ca.SX, ca.SX]:
+    """Return a segment's chord with its first three derivatives by kappa, and cos, sin of half its turn.
+
+    As `segment_chord` for straight gaps, chord = l S(h) + L cos(h) with h = l kappa/2; the derivatives of
+    S(h) = sin(h)/h follow from h S'' + 2 S' + h S = 0, which costs a quarter of automatic ones.
+    """
+    half = segment_length / 2
+    h = half * kappa
+    cos, sin = ca.cos(h), ca.sin(h)
+    value, slope = _sinc_and_slope(h, cos, sin)
+    small = ca.fabs(h) < _SERIES_RADIUS
+    inverse, z = 1 / ca.if_else(small, 1.0, h), h * h
+    second = ca.if_else(small, _polynomial(_SECOND, z), -value - 2 * slope * inverse)
+    third = ca.if_else(small, h * _polynomial(_THIRD, z), -slope + 2 * (slope * inverse - second) * inverse)
+    jet = (
+        segment_length * value + gap_length * cos,
+        half * (segment_length * slope - gap_length * sin),
+        half**2 * (segment_length * second - gap_length * cos),
+        half**3 * (segment_length * third + gap_length * sin),
+    )
+    return jet, cos, sin
 
 
 def body_frame_chain(

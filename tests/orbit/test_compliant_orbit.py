@@ -8,10 +8,12 @@ import pytest
 
 from srs_opt.gait import Wave
 from srs_opt.orbit.attractors import other_orbits
+from srs_opt.orbit.laps import tangent_kernel
 from srs_opt.orbit.sensitivity import sensitivity
 from srs_opt.orbit.steady import steady_gait, steady_gaits
 from srs_opt.robot import wpi_srs
 from srs_opt.simulate.integrate import Integrator
+from srs_opt.simulate.kernel import Course
 from srs_opt.simulate.run import motion_of_cycle
 from srs_opt.simulate.timeline import Timeline
 
@@ -58,22 +60,20 @@ def test_relaxation_matters_as_an_independent_program_says():
     assert speeds[2] > 1.15 * speeds[1]
 
 
-def test_multipliers_are_those_of_finite_differences():
+def test_multipliers_are_those_of_exact_tangents():
     robot, gait = soft(0.003), waves()["straight"].gait()
     orbit = steady_gait(robot, gait)
     run, s = Integrator(robot), orbit.solution
     p = run.pack(gait.pressure_kpa, gait.frequency_hz)
+    dynamic, kernel = run.layout.dynamic, tangent_kernel(run.structure)
+    inputs = np.column_stack([s.valve.T[s.mesh.phase], np.zeros(s.mesh.h_s.size)])
+    still = np.concatenate([p, np.zeros(p.size)])
     columns = []
-    for i in run.layout.dynamic:
-        step = 1e-6 * max(abs(s.start[i]), 1e-2)
-        ends = []
-        for sign in (1, -1):
-            start = s.start.copy()
-            start[i] += sign * step
-            ends.append(run.steps(start, s.mesh, s.valve, p)[0][run.layout.dynamic, -1])
-        columns.append((ends[0] - ends[1]) / (2 * step))
+    for i in dynamic:
+        course = Course(np.concatenate([s.start, np.eye(run.states)[i]]), s.mesh.h_s, inputs, still)
+        columns.append(kernel.run([course])[0][-1, run.states :, 0][dynamic])
     expected = sorted(abs(np.linalg.eigvals(np.array(columns).T)), reverse=True)
-    np.testing.assert_allclose(abs(orbit.multipliers)[:6], expected[:6], rtol=1e-4, atol=1e-6)
+    np.testing.assert_allclose(abs(orbit.multipliers), expected, rtol=1e-4, atol=1e-6)
 
 
 def motion(robot, gait, guess):
