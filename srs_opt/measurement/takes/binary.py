@@ -117,7 +117,7 @@ def read_deeplabcut(path: Path, settings: ReadSettings) -> Take:
     sheet = read_sheet(path)
     above = {cells[0].lower(): cells for _, cells in sheet.rows[:4]}
     first = next((i for i, (_, c) in enumerate(sheet.rows) if c[0].lower() == "coords"), None)
-    if first is None or "bodyparts" not in above:
+    if first is None or not {"bodyparts", "coords"} <= set(above):
         raise InputError(f"{path}: expected rows scorer, bodyparts and coords")
     parts, coords = above["bodyparts"], above["coords"]
     animals = above.get("individuals", parts)
