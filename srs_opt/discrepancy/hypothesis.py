@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from srs_opt.calibrate.coordinates import Candidate, Coordinate, effect_spec
+from srs_opt.calibrate.candidates import Candidate, effect_spec
+from srs_opt.calibrate.coordinates import Coordinate
 from srs_opt.calibrate.experiment import Experiment, Point
 from srs_opt.calibrate.fit import Fit, fit
 from srs_opt.measurement.records import Trial

@@ -11,6 +11,7 @@ from srs_opt.discrepancy.select import Selection
 
 DETECTED = 0.05
 NO_GAP, NAMED, ONE_OF, UNKNOWN, NOT_TESTABLE = "no_gap", "named", "one_of", "unknown", "not_testable"
+NAMED_IN_PART = "named_in_part"
 
 
 @dataclass(frozen=True)
@@ -27,6 +28,8 @@ def judge(
     selection: Selection | None,
     gap: Gap | None,
     at_odds: Sequence[str] = (),
+    *,
+    restricted: bool = False,
 ) -> Verdict:
     """Return the verdict; every doubt counts against a name.
 
@@ -34,6 +37,9 @@ def judge(
     ----------
     at_odds : sequence of str
         Trials without which calibration alone explains the others.
+    restricted : bool
+        Whether only some effects were considered: then what these leave is expected, and does not count
+        against those that close a part of the gap on sealed trials.
     """
     p = null.detection.p_value
     if p >= DETECTED:
@@ -52,6 +58,12 @@ def judge(
     label = " + ".join(selection.best.names)
     if not explained(null, best):
         left = best.detection.p_value
+        if restricted and gap is not None and gap.closed_in_part and not selection.best.implausible():
+            return Verdict(
+                NAMED_IN_PART,
+                f"{label} explains a part of the gap (p of the rest = {left:.2g}); the rest is none of the "
+                "effects that were considered: go on from the corrected robot with all of them",
+            )
         return Verdict(
             UNKNOWN,
             f"the best known explanation ({label}) leaves a gap (p = {left:.2g}, limit {ADEQUATE:g}): "

@@ -10,7 +10,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 # From the bottom up. A module belongs to the longest prefix that fits it.
 LAYERS = (
-    ("srs_opt", "planners", "srs_opt.errors", "srs_opt.processes"),
+    ("srs_opt", "planners", "srs_opt.errors", "srs_opt.processes", "srs_opt.plugins"),
     ("srs_opt.files", "srs_opt.sweep"),
     ("srs_opt.document", "srs_opt.figures", "srs_opt.command"),
     ("srs_opt.problem", "srs_opt.table"),
@@ -39,7 +39,11 @@ LAYERS = (
     ("planners.pilot",),
 )
 # a robot file names effects, so the catalogue of effects checks that part of the file
-ALLOWED = {("srs_opt.robot", "srs_opt.model.effects")}
+ALLOWED = {
+    ("srs_opt.robot", "srs_opt.model.effects"),
+    ("srs_opt.robot", "srs_opt.model.effects.entries"),
+    ("srs_opt.robot", "srs_opt.model.effects.own"),
+}
 LONGEST_FILE = 400
 
 
