@@ -13,6 +13,7 @@ LAYERS = (
     ("srs_opt", "planners", "srs_opt.errors", "srs_opt.processes", "srs_opt.plugins"),
     ("srs_opt.files", "srs_opt.sweep"),
     ("srs_opt.document", "srs_opt.figures", "srs_opt.command"),
+    ("srs_opt.problem", "srs_opt.table"),
     ("srs_opt.robot", "srs_opt.robots"),
     ("srs_opt.gait", "srs_opt.model"),
     ("srs_opt.simulate",),
@@ -82,7 +83,7 @@ def _for_types(node: ast.AST) -> bool:
 
 def is_command(module: str) -> bool:
     """Commands parse, call and print; they sit on top of everything."""
-    return module.endswith(".__main__") or module in ("planners.tour", "srs_opt.import_motive")
+    return module.endswith(".__main__") or module == "planners.tour"
 
 
 def layer(module: str) -> int:
