@@ -37,15 +37,13 @@ def build_parser() -> Parser:
 
 def run(options: argparse.Namespace) -> Answer:
     """Calibrate and write robot.yaml."""
-    from dataclasses import replace
-
-    from srs_opt.calibrate.run import calibrate
+    from srs_opt.calibrate.run import calibrate, going_on_from
     from srs_opt.measurement.dataset import load_dataset
     from srs_opt.robot import load_robot, save_robot
 
     dataset = load_dataset(options.dataset)
     if options.robot is not None:
-        dataset = replace(dataset, robot=load_robot(options.robot))
+        dataset = going_on_from(dataset, load_robot(options.robot))
     found = calibrate(
         dataset, options.model, lambda message: say(options, message), options.jobs, options.cluster
     )

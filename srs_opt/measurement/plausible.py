@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from srs_opt.measurement.problem import Report
-from srs_opt.measurement.table import Row
+from srs_opt.problem import Report
 from srs_opt.robot import Robot
+from srs_opt.table import Row
 
 TURN = 2 * math.pi
 

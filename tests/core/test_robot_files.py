@@ -41,7 +41,13 @@ def test_built_in_robot_is_table_2():
 
 def test_built_in_robot_says_what_is_published_and_what_assumed():
     sources = wpi_srs().sources
-    physical = {f.name for f in dataclasses.fields(Robot)} - {"name", "effects", "relative_sd", "sources"}
+    physical = {f.name for f in dataclasses.fields(Robot)} - {
+        "name",
+        "effects",
+        "plugins",
+        "relative_sd",
+        "sources",
+    }
     assert set(sources) == physical
     published = {"segment_length_m", "link_mass_kg", "friction_tangential", "friction_normal", "links"}
     assert {k for k, v in sources.items() if v == "published"} == published | {"gravity_m_s2"}
