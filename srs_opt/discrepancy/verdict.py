@@ -56,14 +56,13 @@ def judge(
     if selection is None or not selection.best.candidates:
         return Verdict(UNKNOWN, f"there is a gap (p = {p:.2g}), but no known effect explains it")
     label = " + ".join(selection.best.names)
+    # what the effects that were not considered do, calibration bends the bench values for
+    in_part = restricted and gap is not None and gap.closed_in_part
+    in_part = in_part and not selection.best.implausible_size()
     if not explained(null, best):
         left = best.detection.p_value
-        if restricted and gap is not None and gap.closed_in_part and not selection.best.implausible():
-            return Verdict(
-                NAMED_IN_PART,
-                f"{label} explains a part of the gap (p of the rest = {left:.2g}); the rest is none of the "
-                "effects that were considered: go on from the corrected robot with all of them",
-            )
+        if in_part:
+            return _in_part(label, f"p of the rest = {left:.2g}")
         return Verdict(
             UNKNOWN,
             f"the best known explanation ({label}) leaves a gap (p = {left:.2g}, limit {ADEQUATE:g}): "
@@ -71,6 +70,8 @@ def judge(
         )
     against = selection.best.implausible()
     if against:
+        if in_part:
+            return _in_part(label, against)
         return Verdict(UNKNOWN, f"the best known explanation ({label}) is not plausible: {against}")
     if gap is not None and gap.ratio is not None and not gap.passed:
         return Verdict(
@@ -81,3 +82,11 @@ def judge(
         names = " or ".join(" + ".join(h.names) for h in (selection.best, *selection.rivals))
         return Verdict(ONE_OF, f"the data cannot tell between {names}")
     return Verdict(NAMED, f"{label} explains the gap, and nothing else known does")
+
+
+def _in_part(label: str, rest: str) -> Verdict:
+    return Verdict(
+        NAMED_IN_PART,
+        f"{label} explains a part of the gap ({rest}); the rest is none of the effects that were considered: "
+        "go on from the corrected robot with all of them",
+    )
