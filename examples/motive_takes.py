@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from srs_opt.measurement.dataset import write_dataset
-from srs_opt.measurement.motive import read_take
-from srs_opt.measurement.motive_import import ImportOptions, import_takes, read_trial_list
+from srs_opt.measurement.importing import ImportOptions, import_takes, read_trial_list
+from srs_opt.measurement.takes.formats import read_take
 from srs_opt.robot import save_robot, wpi_srs
 from virtual_lab.dataset import Recording, tracks
 from virtual_lab.trials import small_design

@@ -1,7 +1,7 @@
 """An effect of your own: wheels that clog, so that rolling resistance grows with the square of speed.
 
 `register_effect` makes it known to robot files, models, calibrate and discrepancy. For the commands, name
-the file: ``SRS_OPT_EFFECTS=examples/own_effect.py python -m srs_opt.simulate --robot my_robot.yaml``.
+the file: ``python -m srs_opt.simulate --plugin examples/own_effect.py --robot my_robot.yaml``.
 """
 
 from pathlib import Path
@@ -10,7 +10,8 @@ import casadi as ca
 
 from srs_opt.gait import published_wave
 from srs_opt.model.effects import register_effect
-from srs_opt.model.effects.effect import Effect, EffectParameter, Symbols
+from srs_opt.model.effects.effect import Effect, Symbols
+from srs_opt.model.effects.parameter import EffectParameter
 from srs_opt.orbit.steady import steady_gait
 from srs_opt.robot import load_robot
 
@@ -25,6 +26,8 @@ CLOGGED_WHEELS = register_effect(
         name="clogged_wheels",
         kind="ground",
         parameters=(EffectParameter("per_speed2", "N s^2/m^2", typical=0.1, lower=0),),
+        what="wheels clog: rolling resistance grows with the square of speed",
+        look="tow the robot at several speeds",
         rolling_force=drag,
     )
 )

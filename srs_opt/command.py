@@ -77,6 +77,14 @@ def make_parser(
     parser.add_argument(
         "--json", action="store_true", help="print one JSON object on stdout and nothing else there"
     )
+    parser.add_argument(
+        "--plugin",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="FILE.py",
+        help="Python file that defines effects of your own; it is run (repeat for several)",
+    )
     parser.add_argument("--quiet", action="store_true", help="no progress, no messages")
     parser.add_argument(
         "--seed", type=seed_number, default=0, metavar="N", help="seed of all randomness (default 0)"
@@ -113,6 +121,11 @@ def run_command(
         if options.out is None:
             options.out = Path("out") / parser.prog.split()[-1].split(".")[-1]
         check_can_write(options.out, or_file=parser.out_may_be_a_file)
+        if options.plugin:
+            from srs_opt.plugins import load_plugin
+
+            for file in options.plugin:
+                load_plugin(file)
         answer = run(options)
         if options.json:
             print(json.dumps(answer.record, allow_nan=False))

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import csv
-import io
+import math
 from collections import defaultdict
 from pathlib import Path
 
@@ -11,6 +10,9 @@ from srs_opt.document import Document, parse_yaml, unknown_word
 from srs_opt.errors import InputError
 from srs_opt.files import read_text
 from srs_opt.gait import Gait
+from srs_opt.table import first_error, read_table
+
+SCHEDULE_COLUMNS = ("segment", "on_s", "off_s", "period_s")
 
 
 def load_gait(path: str, pressure_kpa: float) -> Gait:
@@ -32,7 +34,7 @@ def load_gait(path: str, pressure_kpa: float) -> Gait:
     file, _, name = path.rpartition(":") if not Path(path).exists() and ":" in path else (path, "", "")
     text = read_text(file, "a gait (JSON of gait_opt, a gait table, or a schedule CSV)")
     if file.lower().endswith(".csv"):
-        return _from_schedule(text, file, pressure_kpa)
+        return _from_schedule(file, pressure_kpa)
     document = parse_yaml(text, file, "a gait (JSON)")
     record = document.value
     if not isinstance(record, dict):
@@ -74,17 +76,16 @@ def _from_result(document: Document) -> Gait:
     return _assemble(pairs, period, pressure, document.source)
 
 
-def _from_schedule(text: str, file: str, pressure_kpa: float) -> Gait:
+def _from_schedule(file: str, pressure_kpa: float) -> Gait:
     pairs: dict[int, list[tuple[float, float]]] = defaultdict(list)
+    rows, report = read_table(file, SCHEDULE_COLUMNS)
     periods = set()
-    for number, row in enumerate(csv.DictReader(io.StringIO(text)), start=2):
-        try:
-            pairs[int(row["segment"])].append((float(row["on_s"]), float(row["off_s"])))
-            periods.add(float(row["period_s"]))
-        except (KeyError, TypeError, ValueError) as error:
-            raise InputError(
-                f"{file}:{number}: expected columns segment, on_s, off_s, period_s with numbers"
-            ) from error
+    for row in rows:
+        segment, on, off, period = (row.number(name, report) for name in SCHEDULE_COLUMNS)
+        if math.isfinite(segment):
+            pairs[int(segment)].append((on, off))
+        periods.add(period)
+    first_error(report)
     if len(periods) != 1:
         raise InputError(f"{file}: expected one period_s for the whole schedule, found {len(periods)}")
     return _assemble(pairs, periods.pop(), pressure_kpa, file)

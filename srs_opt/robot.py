@@ -54,7 +54,10 @@ class Robot:
     bending_relaxation_s : float or None
         Relaxation time of the material (0.005 s where a stiffness is given).
     effects : tuple of dict
-        Effects beyond the paper's model, ``{"name": ..., parameter: value, ...}``.
+        Effects beyond the paper's model, ``{"name": ..., parameter: value, ..., "sd": {parameter: value}}``;
+        calibration refits what has a deviation.
+    plugins : tuple of str
+        What defines effects of one's own among them: plugin files or installed packages.
     relative_sd : dict
         Standard deviation over value, per parameter.
     sources : dict
@@ -81,6 +84,7 @@ class Robot:
     bending_relaxation_s: float | None = None
     gap_stiffness_n_m2: float | None = None
     effects: tuple[EffectSpec, ...] = ()
+    plugins: tuple[str, ...] = ()
     relative_sd: Mapping[str, float] = field(default_factory=dict)
     sources: Mapping[str, str] = field(default_factory=dict)
 
@@ -127,8 +131,9 @@ class Robot:
     def fingerprint(self) -> str:
         """Return a hash of everything that bears on motion (not name, sources or deviations)."""
         record = self.to_record()
-        for key in ("name", "sources", "relative_sd"):
+        for key in ("name", "sources", "relative_sd", "plugins"):
             del record[key]
+        record["effects"] = [{k: v for k, v in e.items() if k != "sd"} for e in record["effects"]]
         if not self.is_soft:
             record.pop("bending_relaxation_s", None)
         if self.effects:
@@ -140,7 +145,9 @@ class Robot:
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
     def __reduce__(self) -> tuple[Any, ...]:  # read-only effects do not pickle; worker processes need robots
-        return _restored, (self.to_record(),)
+        from srs_opt.model.effects import own
+
+        return _restored, (self.to_record(), own.exported())
 
     def __hash__(self) -> int:
         return hash(json.dumps(self.to_record(), sort_keys=True))
@@ -156,7 +163,13 @@ def _plain(value: Any) -> Any:
     return value
 
 
-def _restored(record: dict[str, Any]) -> Robot:
+def _restored(record: dict[str, Any], own_effects: bytes | None = None) -> Robot:
+    """Rebuild a robot that another process sent, with the effects of one's own that are known there."""
+    if own_effects is not None:
+        from srs_opt.model.effects import own
+
+        own.adopt(own_effects)
+    record["plugins"] = tuple(record["plugins"])
     record["effects"] = tuple(MappingProxyType(spec) for spec in record["effects"])
     return Robot(**record)
 
@@ -174,8 +187,13 @@ def robot_from_document(document: Document) -> Robot:
     misplaced = _misplaced(document)
     if misplaced:
         raise misplaced[0]
+    if record.get("plugins"):
+        from srs_opt.model.effects.entries import check_plugins
+
+        check_plugins(document, record["plugins"])
+    record["plugins"] = tuple(record.get("plugins", ()))
     if "effects" in record:
-        from srs_opt.model.effects import check_effects
+        from srs_opt.model.effects.entries import check_effects
 
         record["effects"] = check_effects(document, record["effects"], int(record.get("links", 5)))
     for key, value in record.items():
@@ -184,13 +202,10 @@ def robot_from_document(document: Document) -> Robot:
     robot = Robot(**record)
     if robot.is_soft and robot.bending_relaxation_s is None:
         robot = dataclasses.replace(robot, bending_relaxation_s=RELAXATION_S)
-    _check_body(document, robot)
-    if robot.friction_normal < robot.friction_tangential:
-        raise document.error(
-            ("friction_normal",),
-            f"must be at least friction_tangential ({robot.friction_tangential:g}): "
-            "wheels slide across more easily than they roll?",
-        )
+    if robot.effects:
+        from srs_opt.model.effects.entries import check_body
+
+        check_body(document, robot.effects, robot.links, robot.link_mass_kg, robot.gap_length_m)
     return robot
 
 
@@ -210,7 +225,13 @@ def robot_problems(document: Document) -> list[InputError]:
 
 def _misplaced(document: Document) -> list[InputError]:
     """Return what the tables about parameters say of things that are none."""
-    parameters = {f.name for f in dataclasses.fields(Robot)} - {"name", "effects", "relative_sd", "sources"}
+    parameters = {f.name for f in dataclasses.fields(Robot)} - {
+        "name",
+        "effects",
+        "plugins",
+        "relative_sd",
+        "sources",
+    }
     record = document.value if isinstance(document.value, dict) else {}
     tables = {name: record.get(name) for name in ("relative_sd", "sources")}
     return [
@@ -224,7 +245,7 @@ def _misplaced(document: Document) -> list[InputError]:
 
 def _effect_problems(document: Document, entries: Any, links: Any) -> list[InputError]:
     """Return what is wrong with the single effects; entries without a name are the schema's business."""
-    from srs_opt.model.effects import check_effect
+    from srs_opt.model.effects.entries import check_effect
 
     found = []
     for index, entry in enumerate(entries if isinstance(entries, list) else ()):
@@ -234,21 +255,6 @@ def _effect_problems(document: Document, entries: Any, links: Any) -> list[Input
             except InputError as error:
                 found.append(error)
     return found
-
-
-def _check_body(document: Document, robot: Robot) -> None:
-    """Refuse effects that leave a link without mass or a gap without length."""
-    for index, spec in enumerate(robot.effects):
-        if spec["name"] == "head_mass" and robot.link_mass_kg + spec["extra_kg"] <= 0:
-            raise document.error(
-                ("effects", index, "extra_kg"),
-                f"leaves the head {robot.link_mass_kg + spec['extra_kg']:g} kg; its mass must stay above 0",
-            )
-        if spec["name"] == "gap_length" and robot.gap_length_m + spec["extra_m"] < 0:
-            raise document.error(
-                ("effects", index, "extra_m"),
-                f"leaves gaps of {robot.gap_length_m + spec['extra_m']:g} m; they must stay at least 0",
-            )
 
 
 def load_robot(path: Path | str | None = None) -> Robot:
@@ -276,9 +282,12 @@ def save_robot(robot: Robot, path: Path | str) -> Path:
     import yaml
 
     from srs_opt.files import write_text
+    from srs_opt.model.effects import needed_plugins
 
     record = robot.to_record()
-    for key in ("relative_sd", "sources"):
+    needed = needed_plugins([str(spec["name"]) for spec in robot.effects])
+    record["plugins"] = list(dict.fromkeys([*record["plugins"], *needed]))
+    for key in ("plugins", "relative_sd", "sources"):
         if not record[key]:
             del record[key]
     return write_text(path, yaml.safe_dump(record, sort_keys=False, width=100))

@@ -37,15 +37,13 @@ def build_parser() -> Parser:
 
 def run(options: argparse.Namespace) -> Answer:
     """Calibrate and write robot.yaml."""
-    from dataclasses import replace
-
-    from srs_opt.calibrate.run import calibrate
+    from srs_opt.calibrate.run import calibrate, going_on_from
     from srs_opt.measurement.dataset import load_dataset
     from srs_opt.robot import load_robot, save_robot
 
     dataset = load_dataset(options.dataset)
     if options.robot is not None:
-        dataset = replace(dataset, robot=load_robot(options.robot))
+        dataset = going_on_from(dataset, load_robot(options.robot))
     found = calibrate(
         dataset, options.model, lambda message: say(options, message), options.jobs, options.cluster
     )
@@ -79,6 +77,8 @@ def _summary(found: Calibration) -> str:
         lines.append("from maps alone; 8 s of track of every gait would know better by the factor")
         less = {n: sd / found.sd_with_tracks[n] for n, sd in found.sd.items()}
         lines.append(", ".join(f"{name} {factor:.2g}" for name, factor in less.items()))
+    if found.robot.friction_normal < found.robot.friction_tangential:
+        lines.append("friction across is below friction along: not so with wheels; are head and tail right?")
     if found.after > 1.1:
         lines.append("the model does not explain the data: see python -m srs_opt.discrepancy")
     return "\n".join(lines)

@@ -1,16 +1,13 @@
 """The coordinates that a fit moves in: logs of the robot's parameters, and the effects' sizes.
 
-Every effect enters through coordinates in which it is absent at zero and smooth around it: a bias or a toe
-gets one coordinate per place, a slope or a pull its two components, so that one linearisation without any
-effect sees all effects at all places.
+Every effect enters through coordinates in which it is absent at zero and smooth around it, one set per place,
+so that one linearisation without any effect sees all effects at all places (see `srs_opt.calibrate.forms`).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 from srs_opt.robot import Robot
 
@@ -50,6 +47,8 @@ class Coordinate:
         Standard deviation about `start` (infinite: free).
     start : float
         Value before any fit; for scales (width, speed, nearness) the typical log.
+    log : bool
+        Whether it is the logarithm of an effect's scale.
     """
 
     name: str
@@ -58,6 +57,7 @@ class Coordinate:
     lower: float = -INFINITY
     prior_sd: float = INFINITY
     start: float = 0.0
+    log: bool = False
 
 
 def base_coordinates(robot: Robot) -> tuple[Coordinate, ...]:
@@ -71,103 +71,3 @@ def base_coordinates(robot: Robot) -> tuple[Coordinate, ...]:
 
 
 _CALIBRATED = (*ASSUMED_SD, "segment_length_m", "gap_length_m", "link_mass_kg", "link_inertia_kg_m2")
-
-_WIDTH_SD = 0.7  # of logs of scales about their typical values
-
-
-def _sizes(effect: str, part: str, typical: float, lower: float = -INFINITY) -> Coordinate:
-    return Coordinate(f"{effect}.{part}", effect, typical, lower)
-
-
-def _scale(effect: str, part: str, typical: float) -> Coordinate:
-    return Coordinate(f"{effect}.{part}", effect, 0.3, -INFINITY, _WIDTH_SD, math.log(typical))
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """One effect at one place: what a fit adds to the model.
-
-    Attributes
-    ----------
-    effect : str
-    place : int or None
-        Link or segment, from 1.
-    sizes : tuple of Coordinate
-        Zero when the effect is absent.
-    scales : tuple of Coordinate
-        Logs that mean nothing at zero size.
-    """
-
-    effect: str
-    place: int | None
-    sizes: tuple[Coordinate, ...]
-    scales: tuple[Coordinate, ...] = ()
-
-    @property
-    def label(self) -> str:
-        """Name with the place, for people."""
-        return self.effect if self.place is None else f"{self.effect}[{self.place}]"
-
-    @property
-    def coordinates(self) -> tuple[Coordinate, ...]:
-        """Sizes, then scales."""
-        return self.sizes + self.scales
-
-
-def all_candidates(links: int, names: Iterable[str] | None = None) -> tuple[Candidate, ...]:
-    """Return every effect at every place of a robot with `links` links (or those of the given names)."""
-    from srs_opt.model.effects import all_effects
-
-    found: list[Candidate] = []
-    for name, effect in all_effects().items():
-        if names is not None and name not in names:
-            continue
-        size = effect.size
-        place = next((p for p in effect.parameters if p.place), None)
-        if name in _VECTORS:
-            parts = [_sizes(name, part, size.typical) for part in _VECTORS[name]]
-            found.append(Candidate(name, None, tuple(parts), _SCALES.get(name, ())))
-        elif place is not None:
-            count = links if place.place == "link" else links - 1
-            for k in range(1, count + 1):
-                part = _sizes(name, f"{size.name}[{k}]", size.typical, size.lower)
-                found.append(Candidate(name, k, (part,)))
-        else:
-            part = _sizes(name, size.name, size.typical, size.lower)
-            found.append(Candidate(name, None, (part,), _SCALES.get(name, ())))
-    return tuple(found)
-
-
-_VECTORS = {
-    "tether_pull": ("x_n", "y_n"),
-    "floor_slope": ("x", "y"),
-    "marker_offset": ("dx_m", "dy_m"),
-}
-_SCALES = {
-    "hysteresis": (_scale("hysteresis", "log_width", 4.0),),
-    "stribeck": (_scale("stribeck", "log_speed", 0.08),),
-    "tether_pull": (_scale("tether_pull", "log_nearness", 0.8),),
-}
-
-
-def effect_spec(candidate: Candidate, values: Mapping[str, float]) -> dict[str, Any]:
-    """Return the robot file's entry for a fitted candidate."""
-    name = candidate.effect
-    own = {c.name.split(".", 1)[1]: values.get(c.name, c.start) for c in candidate.coordinates}
-    if name == "tether_pull":
-        force = math.hypot(own["x_n"], own["y_n"])
-        away = math.exp(-own["log_nearness"]) / max(force, 1e-12)
-        return {"name": name, "force_n": force, "ax_m": away * own["x_n"], "ay_m": away * own["y_n"]}
-    if name == "floor_slope":
-        direction = math.atan2(own["y"], own["x"])
-        return {"name": name, "angle": math.hypot(own["x"], own["y"]), "direction": direction}
-    if name == "hysteresis":
-        return {"name": name, "ratio": own["ratio"], "width": math.exp(own["log_width"])}
-    if name == "stribeck":
-        return {"name": name, "excess": own["excess"], "speed": math.exp(own["log_speed"])}
-    if candidate.place is not None:
-        key, value = next(iter(own.items()))
-        part = key.split("[")[0]
-        place = "link" if name == "single_wheel_toe" else "segment"
-        return {"name": name, part: value, place: candidate.place}
-    return {"name": name, **own}

@@ -155,7 +155,10 @@ class Experiment:
 
     def _simulated(self, trials: Sequence[Trial], point: Point, *, rough: bool = False) -> list[Nodes]:
         """Return the trials' motions at `point`; one that was simulated there last is not simulated anew."""
-        wanted = {t.name: {k: v for k, v in point.of_trial(t.name).items() if v != 0} for t in trials}
+        default = self.model.default
+        wanted = {
+            t.name: {k: v for k, v in point.of_trial(t.name).items() if v != default(k)} for t in trials
+        }
         last = {n: self._motions.get(n) for n in wanted}
         known = {n: m[2] for n, m in last.items() if m is not None and m[:2] == (rough, wanted[n])}
         names = [n for n in wanted if n not in known]

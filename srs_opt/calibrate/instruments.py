@@ -12,9 +12,12 @@ import numpy as np
 
 from srs_opt.calibrate.coordinates import SCATTER_SD, Coordinate
 from srs_opt.calibrate.gram import TrialGram
-from srs_opt.calibrate.model import Conditions, Model, Values
+from srs_opt.calibrate.model import Conditions, Model, Values, camera_effects
 from srs_opt.measurement.records import Bench, Check, TowTest
-from srs_opt.model.parameters import Structure
+from srs_opt.model.effects import all_effects
+from srs_opt.model.effects.effect import LinkState
+from srs_opt.model.mechanics import Mechanics
+from srs_opt.model.parameters import Structure, effect_symbols
 from srs_opt.model.registry import build
 
 NAME = "(bench)"  # stands among the trials' names
@@ -31,24 +34,67 @@ class Reading:
 
 
 def check_expectations(model: Model) -> Mapping[str, Callable[[Values], float]]:
-    """Return what each known check should read, by its quantity."""
-    g, mass = model.robot.gravity_m_s2, model.robot.link_mass_kg
+    """Return what each known check should read, by its quantity: asked of the effects' own hooks."""
+    still = Conditions(0.0, 1.0)
+    function = _instrument_readings(model.full)
 
-    def link_weight(values: Values) -> float:
-        return mass * math.exp(values.get("link_mass_kg", 0.0)) * g
+    def reads(quantity: str) -> Callable[[Values], float]:
+        k = QUANTITIES.index(quantity)
 
-    return {
-        "tail_load_n": lambda v: link_weight(v) + v.get("tether_weight.load_n", 0.0),
-        "head_load_n": lambda v: link_weight(v) + g * v.get("head_mass.extra_kg", 0.0),
-        "ruler_scale": _ruler,
-        "ruler_scale_at_1m": lambda v: _ruler(v) * (1 + v.get("camera_tilt.per_m", 0.0) * _ruler(v)),
-        "valve_light_delay_s": lambda v: -v.get("clock_offset.offset_s", 0.0),
-        "floor_angle_rad": lambda v: math.hypot(v.get("floor_slope.x", 0.0), v.get("floor_slope.y", 0.0)),
-    }
+        def expected(values: Values) -> float:
+            packed = model.pack(values, still)
+            return float(function(packed.p, packed.camera, packed.clock_s)[k])
+
+        return expected
+
+    return {quantity: reads(quantity) for quantity in QUANTITIES}
 
 
-def _ruler(values: Values) -> float:
-    return 1 + values.get("camera_scale.scale", 0.0)
+QUANTITIES = (
+    "tail_load_n",
+    "head_load_n",
+    "ruler_scale",
+    "ruler_scale_at_1m",
+    "valve_light_delay_s",
+    "floor_angle_rad",
+)
+
+
+@lru_cache(maxsize=8)
+def _instrument_readings(structure: Structure) -> ca.Function:
+    """Return ``(p, camera, clock_s) -> (QUANTITIES)`` for the straight robot at rest.
+
+    Scales under the tail's and the head's wheels; a short ruler across at x = 0 and 1 m, measured over true
+    length; when a light that follows the valve's command is seen; how steep the floor is.
+    """
+    parameters, m, _ = build(structure)
+    clock = ca.SX.sym("clock")
+    weight = m.normal_force()
+    own = {e.name: effect_symbols(e, structure.links) for e in camera_effects()}
+    camera = ca.vertcat(*(v for symbols in own.values() for v in symbols.values()))
+    x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    seen_x, seen_y = x, y
+    for effect in camera_effects():
+        if effect.camera:
+            seen_x, seen_y = effect.camera(own[effect.name], seen_x, seen_y)
+    across = ca.Function("across", [x, y, camera], [ca.jacobian(seen_y, y)])
+    slope = ca.SX(0)
+    state = _resting(m)
+    for effect, e in parameters.effects:
+        if effect.link_force and effect.knows_the_room and not effect.of_tether:
+            fx, fy = effect.link_force(e, state)
+            slope = slope + ca.vertcat(fx[0], fy[0]) / (m.mass[0] * parameters["gravity_m_s2"])
+    steep = ca.sqrt(ca.sumsqr(slope) + 1e-24)
+    readings = [weight[0], weight[-1], across(0, 0, camera), across(1, 0, camera), -clock, ca.asin(steep)]
+    straight = [ca.substitute(ca.SX(r), m.kappa, ca.SX.zeros(m.kappa.shape)) for r in readings]
+    return ca.Function("readings", [parameters.vector, camera, clock], [ca.vertcat(*straight)])
+
+
+def _resting(m: Mechanics) -> LinkState:
+    """Return the links at the room's origin, at rest."""
+    zero, p = ca.SX.zeros(m.links, 1), m.parameters
+    speed = p["friction_speed_m_s"]
+    return LinkState(zero, zero, ca.SX(0), zero, zero, m.mass, p["gravity_m_s2"], speed)
 
 
 def readings(model: Model, bench: Bench) -> tuple[Reading, ...]:
@@ -67,11 +113,18 @@ def _tow(model: Model, test: TowTest) -> Reading:
     conditions = Conditions(0.0, 1.0, test.with_tether)
     sd = math.hypot(TOW_SD_N, SCATTER_SD["friction_tangential"] * test.force_n)
 
+    # in which direction of the room the robot was towed is not recorded
+    level = {c.name: 0.0 for f in model.forms for c in f.sizes if f.effect.name in _of_the_floor()}
+
     def expected(values: Values) -> float:
-        p = model.pack({k: v for k, v in values.items() if not k.startswith("floor_slope")}, conditions)
+        p = model.pack({**values, **level}, conditions).p
         return float(_tow_force(model.full)(test.speed_m_s, p))
 
     return Reading(test.force_n, sd, expected)
+
+
+def _of_the_floor() -> set[str]:
+    return {name for name, e in all_effects().items() if e.knows_the_room and not e.of_tether}
 
 
 @lru_cache(maxsize=8)

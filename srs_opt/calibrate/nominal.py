@@ -7,11 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from srs_opt.calibrate.model import Conditions, Model, Values
+from srs_opt.calibrate.model import Conditions, Model, Packed, Values
 from srs_opt.calibrate.start import start_pose
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait, Wave
 from srs_opt.measurement.records import Schedule, Trial
+from srs_opt.model.parameters import Structure
+from srs_opt.model.registry import build
 from srs_opt.simulate.integrate import step_kernel
 from srs_opt.simulate.kernel import Kernel
 from srs_opt.simulate.mesh import Mesh
@@ -40,12 +42,15 @@ class Nodes:
     time_s : array (n + 1,)
     body : array (n + 1, 6)
         Pose, then velocity in the robot's frame and yaw momentum.
-    kappa, dkappa, memory : array (n + 1, N-1)
-        Memory is the hysteresis variable z, also where no hysteresis acts.
+    kappa, dkappa : array (n + 1, N-1)
+    memory : array (n + 1, M)
+        Memory holds the variables of hysteresis-like effects, one after the other; none where none acts.
     valve : array (n, N-1)
         Held over each step.
-    p : array
-        Packed parameters of the full structure.
+    p, camera : array
+        Packed parameters of the full structure, and of what the camera sees.
+    clock_s : float
+        The sample labelled t was taken at t + clock_s.
     """
 
     time_s: np.ndarray
@@ -55,6 +60,8 @@ class Nodes:
     memory: np.ndarray
     valve: np.ndarray
     p: np.ndarray
+    camera: np.ndarray
+    clock_s: float
 
 
 def tolerance_for(values: int, sd_m: float) -> float:
@@ -121,10 +128,10 @@ class TrialRun:
     def search(self, values: Values, tolerance_m_s: float = TOLERANCE_M_S) -> Search[Nodes]:
         """Do what a call does, as a search: see `simulate.together` for many trials at once."""
         structure, kept = self.model.structure(values)
-        p = self.model.pack(values, self.conditions)
-        delay = values.get("dead_time.delay_s", 0.0) + self.model.robot.valve_delay_s
-        timeline = self.timeline.delayed(delay)
-        x = self._start(p, structure.segments, nonlinear=structure == self.model.full)
+        packed = self.model.pack(values, self.conditions)
+        p = packed.p
+        timeline = self.timeline.delayed(float(packed.delay_s[0]) + self.model.robot.valve_delay_s)
+        x = self._start(structure, p)
         states, valves, steps = [x[:, None]], [], []
         kernel = step_kernel(structure)
         for number, piece in enumerate(_cycles(timeline, self.trial.period_s)):
@@ -134,11 +141,11 @@ class TrialRun:
             valves.append(piece.valve[:, mesh.phase])
             steps.append(mesh.h_s)
         return _nodes(
-            np.concatenate(states, axis=1), np.concatenate(valves, axis=1), np.concatenate(steps), p
+            np.concatenate(states, axis=1), np.concatenate(valves, axis=1), np.concatenate(steps), packed
         )
 
-    def _start(self, p: np.ndarray, segments: int, *, nonlinear: bool) -> np.ndarray:
-        x = np.zeros(BODY_STATES + segments * (3 if nonlinear else 2))
+    def _start(self, structure: Structure, p: np.ndarray) -> np.ndarray:
+        x = np.zeros(BODY_STATES + build(structure)[2].states)
         x[:3] = start_pose(self.model.full, p, self.trial.heading_rad)[0]
         return x
 
@@ -194,7 +201,7 @@ def _cycles(timeline: Timeline, period_s: float) -> list[Timeline]:
     return pieces
 
 
-def _nodes(states: np.ndarray, valve: np.ndarray, h_s: np.ndarray, p: np.ndarray) -> Nodes:
+def _nodes(states: np.ndarray, valve: np.ndarray, h_s: np.ndarray, packed: Packed) -> Nodes:
     segments = valve.shape[0]
     act = states[BODY_STATES:].T
     kappa, dkappa = act[:, :segments], act[:, segments : 2 * segments]
@@ -205,7 +212,9 @@ def _nodes(states: np.ndarray, valve: np.ndarray, h_s: np.ndarray, p: np.ndarray
         dkappa=dkappa,
         memory=act[:, 2 * segments :],
         valve=valve.T,
-        p=p,
+        p=packed.p,
+        camera=packed.camera,
+        clock_s=float(packed.clock_s[0]),
     )
 
 

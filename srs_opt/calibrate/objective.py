@@ -100,7 +100,7 @@ def best_move(
         parts = {n: g.eliminated(temper, held.get(n), damping) for n, g in grams.items()}
         step = _solved(coordinates, [e.matrix for e in parts.values()], point, damping).step
         for k, c in enumerate(coordinates):
-            if not c.effect or "log_" in c.name:
+            if not c.effect or c.log:
                 step[k] = np.clip(step[k], -longest, longest)
         free = {n: e.back[:, -1] - e.back[:, :-1] @ step for n, e in parts.items()}
         scatter = {n: _within(grams[n], b) for n, b in free.items()}

@@ -11,12 +11,11 @@ import numpy as np
 
 from srs_opt.calibrate.coordinates import Coordinate
 from srs_opt.calibrate.mapped import evaluate, mapped
-from srs_opt.calibrate.model import CAMERA, Model, Values
-from srs_opt.calibrate.nominal import Nodes
+from srs_opt.calibrate.model import Model, Values, camera_effects
+from srs_opt.calibrate.nominal import Nodes, conditions_of
 from srs_opt.calibrate.sensitivity import variation
 from srs_opt.measurement.records import Trial
-from srs_opt.model.effects import all_effects
-from srs_opt.model.parameters import Structure
+from srs_opt.model.parameters import Structure, effect_symbols
 from srs_opt.model.registry import build
 from srs_opt.simulate.compiled import compiled
 
@@ -43,15 +42,16 @@ class Prediction:
 
 @lru_cache(maxsize=8)
 def _picture(structure: Structure, centre_only: bool) -> ca.Function:
-    """Return ``(pose, kappa, camera (4), p) -> (points, by pose, by kappa, by camera, by p)``, mapped."""
+    """Return ``(pose, kappa, camera, p) -> (points, by pose, by kappa, by camera, by p)``, mapped."""
 
     def make() -> ca.Function:
         parameters, m, _ = build(structure)
-        pose, camera = ca.SX.sym("pose", 3), ca.SX.sym("camera", len(CAMERA))
+        pose = ca.SX.sym("pose", 3)
+        values = {e.name: effect_symbols(e, structure.links) for e in camera_effects()}
+        camera = ca.vertcat(*(v for own in values.values() for v in own.values()))
         c, s = ca.cos(pose[2]), ca.sin(pose[2])
         x = pose[0] + c * m.chain.x - s * m.chain.y
         y = pose[1] + s * m.chain.x + c * m.chain.y
-        values = {name: camera[i] for i, name in enumerate(CAMERA)}
         x, y = _seen(x, y, pose[2] + m.chain.angle, values, m.mass if centre_only else None)
         points = ca.vec(ca.horzcat(x, y).T)
         p = parameters.vector
@@ -60,27 +60,23 @@ def _picture(structure: Structure, centre_only: bool) -> ca.Function:
         single = ca.Function("picture", [pose, m.kappa, camera, p], outputs, {"cse": True})
         return mapped(single, (2, 3))
 
-    return compiled(f"picture {centre_only} {structure}", make)
+    seen = " ".join(e.name for e in camera_effects())
+    return compiled(f"picture {centre_only} {structure} {seen}", make)
 
 
 def _seen(
-    x: ca.SX, y: ca.SX, angle: ca.SX, values: dict[str, ca.SX], mass: ca.SX | None
+    x: ca.SX, y: ca.SX, angle: ca.SX, values: dict[str, dict[str, ca.SX]], mass: ca.SX | None
 ) -> tuple[ca.SX, ca.SX]:
     """Apply marker offsets, the mean over the body where only that is recorded, then the camera's errors."""
-    hooks = [(e, _own(name, values)) for name, e in all_effects().items() if e.marker or e.camera]
-    for effect, own in hooks:
+    for effect in camera_effects():
         if effect.marker:
-            x, y = effect.marker(own, x, y, angle)
+            x, y = effect.marker(values[effect.name], x, y, angle)
     if mass is not None:
         x, y = (ca.dot(mass, v) / ca.sum1(mass) for v in (x, y))
-    for effect, own in hooks:
+    for effect in camera_effects():
         if effect.camera:
-            x, y = effect.camera(own, x, y)
+            x, y = effect.camera(values[effect.name], x, y)
     return x, y
-
-
-def _own(effect: str, values: dict[str, ca.SX]) -> dict[str, ca.SX]:
-    return {name.split(".")[1]: v for name, v in values.items() if name.startswith(effect + ".")}
 
 
 def _hermite(time_s: np.ndarray, value: np.ndarray, rate: np.ndarray, at: np.ndarray) -> np.ndarray:
@@ -117,19 +113,21 @@ def predict(
     nodes : Nodes
         The trial simulated at `values`.
     """
-    at = trial.time_s + values.get("clock_offset.offset_s", 0.0)
-    camera = np.array([values.get(name, 0.0) for name in CAMERA])
+    at = trial.time_s + nodes.clock_s
     rate = _pose_rate(model, nodes, values)
     pose = _hermite(nodes.time_s, nodes.body[:, :3], rate, at)
     kappa = _hermite(nodes.time_s, nodes.kappa, nodes.dkappa, at)
     structure, kept = model.structure(values, coordinates)
     function = _picture(structure, centre_only)
-    points, by_pose, by_kappa, by_camera, by_p = evaluate(function, (pose, kappa), camera, nodes.p[kept])
+    points, by_pose, by_kappa, by_camera, by_p = evaluate(
+        function, (pose, kappa), nodes.camera, nodes.p[kept]
+    )
     frames, seen = points.shape
     slopes = np.zeros((frames, seen, len(coordinates)))
     if not coordinates:
         return Prediction(points, slopes, pose, kappa)
-    seeds = model.seeds(values, _conditions(trial), coordinates)[kept]
+    by = model.seeds(values, conditions_of(trial), coordinates)
+    seeds = by.p[kept]
     moving = np.flatnonzero(np.any(seeds != 0, axis=0))
     jac_pose = by_pose.reshape(frames, 3, seen).transpose(0, 2, 1)
     jac_kappa = by_kappa.reshape(frames, -1, seen).transpose(0, 2, 1)
@@ -144,21 +142,12 @@ def predict(
         slopes[:, :, moving] = part
     jac_camera = by_camera.reshape(frames, -1, seen).transpose(0, 2, 1)
     velocity = _velocity(nodes, rate, at)
-    in_time = (jac_pose @ velocity[0][..., None] + jac_kappa @ velocity[1][..., None])[..., 0]
-    for k, coordinate in enumerate(coordinates):
-        if coordinate.name in CAMERA:
-            slopes[:, :, k] = jac_camera[:, :, CAMERA.index(coordinate.name)]
-        elif coordinate.name == "clock_offset.offset_s":
-            slopes[:, :, k] = in_time
-        elif coordinate.name == "dead_time.delay_s":
-            slopes[:, :, k] = -in_time
+    in_time = jac_pose @ velocity[0][..., None] + jac_kappa @ velocity[1][..., None]
+    later = (by.clock_s - by.delay_s)[0]  # a delay of the valves shifts the motion in time
+    slopes[:, :, later != 0] += in_time * later[later != 0]
+    shown = np.any(by.camera != 0, axis=0)
+    slopes[:, :, shown] += jac_camera @ by.camera[:, shown]
     return Prediction(points, slopes, pose, kappa)
-
-
-def _conditions(trial: Trial):  # type: ignore[no-untyped-def]
-    from srs_opt.calibrate.nominal import conditions_of
-
-    return conditions_of(trial)
 
 
 @lru_cache(maxsize=8)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from srs_opt.calibrate.candidates import entry_after
 from srs_opt.calibrate.coordinates import FRICTION_SPEED, Coordinate
 from srs_opt.calibrate.fit import Fit
 from srs_opt.robot import Robot
@@ -23,7 +24,8 @@ class Calibration:
     robot : Robot
         With calibrated values, their relative_sd and sources.
     parameters, sd : dict
-        Estimates and standard deviations, in the parameters' units.
+        Estimates and standard deviations, in the parameters' units; of the robot's effects the fit's
+        coordinates (a size, or its components; logarithms of scales).
     correlation : array (K, K)
         Of the parameters, in their order.
     unidentifiable : tuple of str
@@ -53,16 +55,17 @@ def calibrated_robot(robot: Robot, fit: Fit) -> Robot:
             changes[name] = getattr(robot, name) * math.exp(fit.point.values[name])
             deviations[name] = fit.sd[name]
             sources[name] = "calibrated"
-    return robot.with_values(**changes, relative_sd=deviations, sources=sources)
+    effects = [entry_after(entry, fit) for entry in robot.effects]
+    return robot.with_values(**changes, effects=effects, relative_sd=deviations, sources=sources)
 
 
 def calibration(robot: Robot, fit: Fit, before: float, after: float) -> Calibration:
     """Return the calibration behind a fit of the base coordinates."""
     corrected = calibrated_robot(robot, fit)
-    names = [c.name for c in fit.coordinates if c.name != FRICTION_SPEED]
     index = [i for i, c in enumerate(fit.coordinates) if c.name != FRICTION_SPEED]
-    values = {n: float(getattr(corrected, n)) for n in names}
-    sds = {n: values[n] * fit.sd[n] for n in names}
+    names = [fit.coordinates[i].name for i in index]
+    values = {n: fit.point.values[n] if "." in n else float(getattr(corrected, n)) for n in names}
+    sds = {n: fit.sd[n] if "." in n else values[n] * fit.sd[n] for n in names}
     covariance = fit.covariance[np.ix_(index, index)]
     size = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     return Calibration(

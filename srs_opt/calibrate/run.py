@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
-from srs_opt.calibrate.coordinates import base_coordinates
+from srs_opt.calibrate.candidates import fitted_coordinates
 from srs_opt.calibrate.crew import helped
 from srs_opt.calibrate.experiment import Experiment
 from srs_opt.calibrate.fit import fit, start_point
@@ -15,6 +16,7 @@ from srs_opt.calibrate.noise import noise_sd_m
 from srs_opt.calibrate.result import Calibration, calibration
 from srs_opt.errors import InputError
 from srs_opt.measurement.records import DataSet
+from srs_opt.robot import Robot
 
 
 def calibrate(
@@ -52,9 +54,37 @@ def calibrate(
                 f"trial {t.name} has {t.markers_m.shape[1]} markers, robot '{dataset.robot.name}' has "
                 f"{dataset.robot.links} links"
             )
-    base = base_coordinates(dataset.robot)
+    base = fitted_coordinates(dataset.robot)
     experiment = Experiment(Model(dataset.robot, model), trials, noise_sd_m(dataset), dataset.bench)
     with helped(experiment, jobs, cluster):
         found = fit(experiment, base, start_point(base), report=tell)
     before, after = math.sqrt(found.start_misfit_ratio), math.sqrt(found.misfit_ratio)
     return calibration(dataset.robot, found, before, after)
+
+
+def going_on_from(dataset: DataSet, robot: Robot) -> DataSet:
+    """Return the data set with another robot file's values and effects as the starting point.
+
+    Values that were calibrated may come from these very data, which must not count twice: for them the data
+    set's own bench values and deviations stay. Effects of an earlier answer are refitted where they have a
+    deviation.
+
+    Raises
+    ------
+    InputError
+        If the robots have different numbers of links.
+    """
+    own = dataset.robot
+    if robot.links != own.links:
+        raise InputError(
+            f"robot '{robot.name}' has {robot.links} links, that of data set '{dataset.name}' has {own.links}"
+        )
+    names = [name for name, source in robot.sources.items() if source == "calibrated"]
+    deviations = {n: sd for n, sd in robot.relative_sd.items() if n not in names}
+    sources = {n: s for n, s in robot.sources.items() if n not in names}
+    changed = robot.with_values(
+        **{n: getattr(own, n) for n in names},
+        relative_sd={**deviations, **{n: own.relative_sd[n] for n in names if n in own.relative_sd}},
+        sources={**sources, **{n: own.sources[n] for n in names if n in own.sources}},
+    )
+    return replace(dataset, robot=changed)

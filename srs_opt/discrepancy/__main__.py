@@ -23,7 +23,8 @@ def build_parser() -> Parser:
         "python -m srs_opt.discrepancy",
         "Find where simulation and measured data disagree, name the missing effect or abstain, show the gap\n"
         "shrink on trials that no fit saw. Writes report.html and corrected_robot.yaml.\n"
-        "JSON: verdict (no_gap, named, one_of, unknown, not_testable), effects, alternatives, located,\n"
+        "JSON: verdict (no_gap, named, named_in_part, one_of, unknown, not_testable), effects, believed,\n"
+        "alternatives, alike (pairs of effects that act alike on these data, angle in rad), located,\n"
         "gap (m, root mean square per coordinate), next_experiment, candidates, corrected_robot, seconds;\n"
         "with --payoff also payoff (m/s, rad/s; null where nothing was named), with --maze payoff.maze\n"
         "(m, s): plans before and after, both driven on the corrected robot.",
@@ -50,19 +51,29 @@ def build_parser() -> Parser:
         metavar="FILE",
         help="a maze (see plan --help) to plan through before and after as well; implies --payoff",
     )
+    parser.add_argument(
+        "--robot",
+        type=Path,
+        metavar="FILE",
+        help="robot file to go on from (an earlier corrected_robot.yaml): its effects are part of the model, "
+        "refitted where they have a deviation; bench values stay the data set's own",
+    )
     parser.add_argument("--model", choices=("complex", "simplified"), default="complex", help="dynamic model")
     return parser
 
 
 def run(options: argparse.Namespace) -> Answer:
     """Find the discrepancy; write the report and the corrected robot."""
+    from srs_opt.calibrate.run import going_on_from
     from srs_opt.discrepancy.answer import answer, corrected_robot
     from srs_opt.discrepancy.pipeline import find_discrepancy
     from srs_opt.discrepancy.report import write_report
     from srs_opt.measurement.dataset import load_dataset
-    from srs_opt.robot import save_robot
+    from srs_opt.robot import load_robot, save_robot
 
     dataset = load_dataset(options.dataset)
+    if options.robot is not None:
+        dataset = going_on_from(dataset, load_robot(options.robot))
     effects = _effect_names(options.effects) if options.effects else None
     maze = _maze(options, dataset.robot)
     found = find_discrepancy(

@@ -2,31 +2,29 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from srs_opt.calibrate.coordinates import Candidate, effect_spec
+from srs_opt.calibrate.candidates import effect_spec, entry_sd, with_sd
 from srs_opt.calibrate.result import calibrated_robot
 from srs_opt.discrepancy.examined import needed_gain
 from srs_opt.discrepancy.hypothesis import Hypothesis
 from srs_opt.discrepancy.pipeline import Discrepancy
 from srs_opt.discrepancy.screen import Score
-from srs_opt.discrepancy.verdict import NAMED, ONE_OF
 from srs_opt.robot import Robot
 
 
 def answer(found: Discrepancy, robot_file: Path | None) -> dict[str, Any]:
     """Return the command's JSON object."""
-    speaks = found.verdict.word in (NAMED, ONE_OF)
+    speaks = found.believed
     best = found.selection.best if found.selection and speaks else None
     rivals = found.selection.rivals if found.selection and speaks else ()
     return {
         "verdict": found.verdict.word,
         "why": found.verdict.why,
         "effects": _effects(best) if best else [],
+        "believed": found.believed,
+        "alike": [{"effects": list(p.effects), "angle_rad": round(p.angle_rad, 4)} for p in found.alike],
         "alternatives": [list(h.names) for h in rivals],
         "located": [
             {"where": p.where, "against": p.against, "score": round(p.score, 2)} for p in found.located
@@ -43,31 +41,12 @@ def _effects(best: Hypothesis) -> list[dict[str, Any]]:
     found = []
     for candidate in best.candidates:
         spec = effect_spec(candidate, best.fit.point.values)
-        sd = parameter_sd(best, candidate)
+        sd = entry_sd(candidate.form, best.fit)
         parameters = {k: v for k, v in spec.items() if k != "name"}
-        found.append({"name": spec["name"], "parameters": parameters, "sd": sd})
+        effect = candidate.form.effect
+        words = {"what": effect.what, "look": effect.look}
+        found.append({"name": spec["name"], "parameters": parameters, "sd": sd, **words})
     return found
-
-
-def parameter_sd(best: Hypothesis, candidate: Candidate) -> dict[str, float]:
-    """Return the standard deviations of an effect's parameters (first order; places have none)."""
-    names = [c.name for c in best.fit.coordinates]
-    own = [names.index(c.name) for c in candidate.coordinates]
-    covariance = best.fit.covariance[np.ix_(own, own)]
-    values = best.fit.point.values
-    here = effect_spec(candidate, values)
-    keys = [k for k, v in here.items() if isinstance(v, float)]
-    slopes = np.zeros((len(keys), len(own)))
-    for j, c in enumerate(candidate.coordinates):
-        h = 1e-4 * c.typical
-        ends = [effect_spec(candidate, {**values, c.name: values[c.name] + s * h}) for s in (1, -1)]
-        for i, key in enumerate(keys):
-            change = ends[0][key] - ends[1][key]
-            if key == "direction":
-                change = math.remainder(change, 2 * math.pi)
-            slopes[i, j] = change / (2 * h)
-    variances = np.diag(slopes @ covariance @ slopes.T)
-    return {k: float(math.sqrt(max(v, 0.0))) for k, v in zip(keys, variances)}
 
 
 def _gap(found: Discrepancy, speaks: bool) -> dict[str, Any] | None:
@@ -116,7 +95,7 @@ def candidate_rows(found: Discrepancy) -> list[dict[str, Any]]:
 def _fate(found: Discrepancy, score: Score, temper: float) -> str:
     effect = score.candidate.effect
     selection = found.selection
-    speaks = found.verdict.word in (NAMED, ONE_OF)
+    speaks = found.believed
     if selection and speaks and effect in selection.best.names:
         return "chosen"
     if selection and speaks and any(effect in h.names for h in selection.rivals):
@@ -129,11 +108,18 @@ def _fate(found: Discrepancy, score: Score, temper: float) -> str:
 
 
 def corrected_robot(found: Discrepancy) -> Robot | None:
-    """Return the calibrated robot with the named effects in; None where nothing was calibrated."""
+    """Return the calibrated robot with the named effects in; None where nothing was calibrated.
+
+    Effects have deviations, so that a later fit that starts from this robot refits their sizes.
+    """
     if found.selection is None or found.null is None:
         return None
-    speaks = found.verdict.word in (NAMED, ONE_OF)
-    hypothesis = found.selection.best if speaks else found.null.hypothesis
+    best = found.selection.best
+    hypothesis = best if found.believed else found.null.hypothesis
     robot = calibrated_robot(found.dataset.robot, hypothesis.fit)
-    effects = [*(dict(e) for e in robot.effects), *(hypothesis.specs() if speaks else [])]
-    return robot.with_values(effects=effects)
+    if not found.believed:
+        return robot
+    named = [
+        with_sd(effect_spec(c, best.fit.point.values), entry_sd(c.form, best.fit)) for c in best.candidates
+    ]
+    return robot.with_values(effects=[*(dict(e) for e in robot.effects), *named])

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from srs_opt.calibrate.experiment import Experiment, Point
 from srs_opt.calibrate.gram import bounded_solve
+from srs_opt.calibrate.instruments import check_expectations
 from srs_opt.discrepancy.hypothesis import Hypothesis
 from srs_opt.discrepancy.select import Selection
 from srs_opt.errors import NoAnswerError
@@ -36,22 +37,15 @@ class NextExperiment:
     expected_power: float
 
 
-@dataclass(frozen=True)
-class Instrument:
-    """A reading, its standard deviation, and how it depends on fitted values."""
-
-    what: str
-    sd: float
-    coordinate: str
-
-
-INSTRUMENTS = (
-    Instrument("a light on the valve's command (valve_light_delay_s)", 0.002, "clock_offset.offset_s"),
-    Instrument("a ruler in the picture (ruler_scale)", 0.002, "camera_scale.scale"),
-    Instrument("a ruler in the picture at x = 1 m (ruler_scale_at_1m)", 0.002, "camera_tilt.per_m"),
-    Instrument("a scale under the tail's wheels (tail_load_n)", 0.005, "tether_weight.load_n"),
-    Instrument("a scale under the head's wheels (head_load_n)", 0.005, "head_mass.extra_kg"),
-)  # fmt: skip
+# what a further instrument shows (a quantity of bench/checks.csv) and its standard deviation
+INSTRUMENTS = {
+    "valve_light_delay_s": ("a light on the valve's command", 0.002),
+    "ruler_scale": ("a ruler in the picture", 0.002),
+    "ruler_scale_at_1m": ("a ruler in the picture at x = 1 m", 0.002),
+    "tail_load_n": ("a scale under the tail's wheels", 0.005),
+    "head_load_n": ("a scale under the head's wheels", 0.005),
+    "floor_angle_rad": ("a level on the floor", 0.001),
+}
 
 
 def rivals_of(selection: Selection, fitted: Sequence[Hypothesis]) -> tuple[Hypothesis, ...]:
@@ -81,7 +75,11 @@ def next_experiment(
     if len(rivals) < 2 or not trials:
         return None
     first, second = rivals[0], rivals[1]
-    options = {i.what: _instrument_gain(i, first, second) for i in INSTRUMENTS}
+    expected = check_expectations(experiment.model)
+    options = {
+        f"{what} ({quantity})": _instrument_gain(expected[quantity], sd, first, second)
+        for quantity, (what, sd) in INSTRUMENTS.items()
+    }
     new = proposals(experiment, trials)
     both = [_trial_gains(experiment, a, b, new) for a, b in ((first, second), (second, first))]
     options |= {what: min(gains[what] for gains in both) for what in new}
@@ -97,10 +95,24 @@ def power(gain: float) -> float:
     return float(1 - chndtr(LEVEL, 1, max(gain, 1e-9)))
 
 
-def _instrument_gain(instrument: Instrument, a: Hypothesis, b: Hypothesis) -> float:
-    values = [h.fit.point.values.get(instrument.coordinate, 0.0) for h in (a, b)]
-    sds = [h.fit.sd.get(instrument.coordinate, 0.0) for h in (a, b)]
-    return float((values[0] - values[1]) ** 2 / (instrument.sd**2 + max(sds) ** 2))
+def _instrument_gain(
+    expected: Callable[[Mapping[str, float]], float], sd: float, a: Hypothesis, b: Hypothesis
+) -> float:
+    """Return the deviance by which a reading would tell two hypotheses apart."""
+    readings = [expected(h.fit.point.values) for h in (a, b)]
+    variance = max(_reading_variance(expected, h) for h in (a, b))
+    return float((readings[0] - readings[1]) ** 2 / (sd**2 + variance))
+
+
+def _reading_variance(expected: Callable[[Mapping[str, float]], float], h: Hypothesis) -> float:
+    """Return how well a hypothesis knows what the instrument will show, as a variance, to first order."""
+    values = h.fit.point.values
+    slopes = np.zeros(len(h.fit.coordinates))
+    for k, c in enumerate(h.fit.coordinates):
+        step = 1e-4 * c.typical
+        ends = [expected({**values, c.name: values[c.name] + s * step}) for s in (1, -1)]
+        slopes[k] = (ends[0] - ends[1]) / (2 * step)
+    return float(slopes @ h.fit.covariance @ slopes)
 
 
 def proposals(experiment: Experiment, trials: Sequence[Trial]) -> Mapping[str, Trial]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from srs_opt.calibrate.coordinates import Candidate
+from srs_opt.calibrate.candidates import Candidate
 from srs_opt.discrepancy.detect import Detection
 from srs_opt.discrepancy.functions import Group
 from srs_opt.discrepancy.hypothesis import Hypothesis

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from srs_opt.calibrate.coordinates import Candidate, Coordinate, effect_spec
+from srs_opt.calibrate.candidates import Candidate, effect_spec
+from srs_opt.calibrate.coordinates import Coordinate
 from srs_opt.calibrate.experiment import Experiment, Point
 from srs_opt.calibrate.fit import Fit, fit
 from srs_opt.measurement.records import Trial
@@ -65,12 +66,20 @@ class Hypothesis:
 
     def implausible(self) -> str:
         """Return what physics or the bench has against the fitted values; empty when nothing."""
+        return self.implausible_size() or self.against_the_bench()
+
+    def implausible_size(self) -> str:
+        """Return which effect would have an unlikely size; empty when none."""
         for candidate in self.candidates:
             size = self.relative_size(candidate)
             if size > LARGE:
                 return f"{candidate.label} would have to be {size:.1f} times its typical size"
             if size < SMALL and len(self.candidates) > 1:
                 return f"{candidate.label} would be only {size:.2f} of its typical size"
+        return ""
+
+    def against_the_bench(self) -> str:
+        """Return which calibrated value would lie far from its bench value; empty when none."""
         for coordinate in self.fit.coordinates:
             if np.isfinite(coordinate.prior_sd) and not coordinate.effect:
                 off = (self.fit.point.values[coordinate.name] - coordinate.start) / coordinate.prior_sd

@@ -14,7 +14,8 @@ STAGES = {
     "ground": "curvature to motion (ground)",
     "tether": "curvature to motion (tether)",
     "room": "place in the room",
-    "measurement": "camera and clock",
+    "measurement": "camera",
+    "clock": "clock",
 }
 
 

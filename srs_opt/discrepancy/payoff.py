@@ -9,7 +9,6 @@ from typing import Any
 from srs_opt.calibrate.result import calibrated_robot
 from srs_opt.discrepancy.answer import corrected_robot
 from srs_opt.discrepancy.pipeline import Discrepancy
-from srs_opt.discrepancy.verdict import NAMED, ONE_OF
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait
 from srs_opt.gait_opt.collocation.problem import CycleProblem
@@ -90,7 +89,7 @@ def payoff(
         Gets messages about the progress.
     """
     after = corrected_robot(found)
-    if found.verdict.word not in (NAMED, ONE_OF) or after is None or found.null is None:
+    if not found.believed or after is None or found.null is None:
         return None
     before = calibrated_robot(found.dataset.robot, found.null.hypothesis.fit)
     try:

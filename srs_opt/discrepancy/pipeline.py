@@ -6,12 +6,14 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from srs_opt.calibrate.coordinates import Candidate, all_candidates, base_coordinates
+from srs_opt.calibrate.candidates import Candidate, all_candidates, fitted_coordinates
 from srs_opt.calibrate.crew import helped
 from srs_opt.calibrate.experiment import Experiment
 from srs_opt.calibrate.fit import FAR_OFF
+from srs_opt.calibrate.forms import form_of_entry
 from srs_opt.calibrate.model import Model
 from srs_opt.calibrate.noise import noise_sd_m
+from srs_opt.discrepancy.alike import Pair, alike_pairs
 from srs_opt.discrepancy.design import NextExperiment, next_experiment, rivals_of
 from srs_opt.discrepancy.examined import Examined
 from srs_opt.discrepancy.hypothesis import Hypothesis
@@ -21,7 +23,17 @@ from srs_opt.discrepancy.seal import Gap, open_seal
 from srs_opt.discrepancy.search import Search
 from srs_opt.discrepancy.select import Selection, select
 from srs_opt.discrepancy.split import LEAST_OPEN, Split, few_and_brief, split_trials
-from srs_opt.discrepancy.verdict import DETECTED, NO_GAP, NOT_TESTABLE, ONE_OF, UNKNOWN, Verdict, judge
+from srs_opt.discrepancy.verdict import (
+    DETECTED,
+    NAMED,
+    NAMED_IN_PART,
+    NO_GAP,
+    NOT_TESTABLE,
+    ONE_OF,
+    UNKNOWN,
+    Verdict,
+    judge,
+)
 from srs_opt.measurement.records import DataSet
 
 
@@ -62,6 +74,12 @@ class Discrepancy:
     experiment: Experiment | None = None
     fitted: tuple[Hypothesis, ...] = ()
     tried: frozenset[str] = frozenset()
+    alike: tuple[Pair, ...] = ()
+
+    @property
+    def believed(self) -> bool:
+        """Whether the best set of effects is taken for what is missing, or for a part of it."""
+        return self.verdict.word in (NAMED, NAMED_IN_PART, ONE_OF)
 
 
 def find_discrepancy(
@@ -100,9 +118,9 @@ def find_discrepancy(
     trials = (*split.open, *split.sealed, *quick)
     experiment = Experiment(Model(dataset.robot, model), trials, sd, dataset.bench)
     candidates = _candidates(dataset, effects)
-    search = Search(experiment, base_coordinates(dataset.robot), candidates, split.open, seed, tell, quick)
+    search = Search(experiment, fitted_coordinates(dataset.robot), candidates, split.open, seed, tell, quick)
     with helped(experiment, jobs, cluster, (split.open, quick, split.sealed)):
-        return _examine(dataset, search, split, tell, started)
+        return _examine(dataset, search, split, tell, started, restricted=effects is not None)
 
 
 def _examine(
@@ -111,6 +129,8 @@ def _examine(
     split: Split,
     tell: Callable[[str], None],
     started: float,
+    *,
+    restricted: bool,
 ) -> Discrepancy:
     experiment = search.experiment
     tell(f"calibrating on {len(split.open)} trials")
@@ -126,7 +146,7 @@ def _examine(
     selection = select(best.hypothesis, fitted, split)
     tell("opening the sealed trials")
     gap = open_seal(experiment, first.fit, best.hypothesis.fit, split.sealed, search.seed)
-    verdict = judge(null, best, selection, gap, at_odds)
+    verdict = judge(null, best, selection, gap, at_odds, restricted=restricted)
     following = None
     if verdict.word in (ONE_OF, UNKNOWN) and not at_odds:
         following = next_experiment(experiment, rivals_of(selection, fitted), split.open)
@@ -146,6 +166,7 @@ def _examine(
         experiment,
         tuple(fitted),
         frozenset(search.tried),
+        alike_pairs(null.linearisation, search.candidates),
     )
 
 
@@ -170,8 +191,8 @@ def _explained_without(search: Search, null: Examined, odd: Sequence[str]) -> bo
 
 def _candidates(dataset: DataSet, effects: Sequence[str] | None) -> tuple[Candidate, ...]:
     found = all_candidates(dataset.robot.links, effects)
-    present = {str(e["name"]) for e in dataset.robot.effects}
-    return tuple(c for c in found if c.effect not in present)
+    present = {Candidate(form_of_entry(e)).label for e in dataset.robot.effects}
+    return tuple(c for c in found if c.label not in present)
 
 
 def _not_testable(

@@ -10,12 +10,13 @@ from typing import Any
 from srs_opt.discrepancy.examined import Examined
 from srs_opt.discrepancy.pictures import Picture, pictures
 from srs_opt.discrepancy.pipeline import Discrepancy
-from srs_opt.discrepancy.verdict import NAMED, NO_GAP, NOT_TESTABLE, ONE_OF, UNKNOWN
+from srs_opt.discrepancy.verdict import NAMED, NAMED_IN_PART, NO_GAP, NOT_TESTABLE, ONE_OF, UNKNOWN
 from srs_opt.files import write_text
 
 HEADLINES = {
     NO_GAP: "No gap: the calibrated model explains these data",
     NAMED: "Named: {names}",
+    NAMED_IN_PART: "Named in part: {names}",
     ONE_OF: "One of: {names}",
     UNKNOWN: "A gap that no known effect explains",
     NOT_TESTABLE: "Not testable with these data",
@@ -66,7 +67,7 @@ def _parameters(found: Discrepancy) -> list[dict[str, Any]]:
         return []
     rows = []
     fits = [found.null.hypothesis.fit, found.selection.best.fit]
-    for coordinate in fits[0].coordinates:
+    for coordinate in (c for c in fits[0].coordinates if not c.effect):
         bench = getattr(found.dataset.robot, coordinate.name)
         values = [bench * math.exp(f.point.values[coordinate.name]) for f in fits]
         off = fits[1].point.values[coordinate.name] - coordinate.start

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from srs_opt.calibrate.coordinates import Candidate, Coordinate
+from srs_opt.calibrate.candidates import Candidate
+from srs_opt.calibrate.coordinates import Coordinate
 from srs_opt.calibrate.experiment import Point
 from srs_opt.calibrate.gram import TrialGram, bounded_solve
 from srs_opt.calibrate.objective import priors, sum_eliminated

@@ -52,6 +52,11 @@ class Gap:
             return False
         return self.ratio <= PASSED or (self.interval[0] <= PASSED and self.ratio <= NEARLY)
 
+    @property
+    def closed_in_part(self) -> bool:
+        """Whether the effect closes some of the gap beyond doubt."""
+        return self.interval is not None and self.interval[1] < 1.0
+
 
 def sealed_residuals(experiment: Experiment, fit: Fit, trials: Sequence[Trial]) -> list[np.ndarray]:
     """Return the residuals (T, 2 M) of every trial at the fit, with the trial's own most probable scatter."""

@@ -7,10 +7,12 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from srs_opt.calibrate.coordinates import Candidate, Coordinate
+from srs_opt.calibrate.candidates import Candidate
+from srs_opt.calibrate.coordinates import Coordinate
 from srs_opt.calibrate.experiment import Experiment, Point
 from srs_opt.calibrate.fit import FAR_OFF, PLAIN, Fit, start_point
 from srs_opt.calibrate.objective import priors, sum_eliminated
+from srs_opt.discrepancy.alike import Angles
 from srs_opt.discrepancy.detect import detect, project
 from srs_opt.discrepancy.examined import TELLING, Examined, explained, needed_gain
 from srs_opt.discrepancy.functions import ResidualFunctions
@@ -39,17 +41,9 @@ LEFT = 0.5
 HOPELESS = 0.1  # share of the gap that the best known effects leave, from which on more data help nothing
 FIRM = 10.0  # standard deviations from zero at which an effect is not superfluous, without a refit
 
-# effects that act much alike: a member that is well behind in the screen is refitted all the same
-LOOK_ALIKES = (
-    {"dead_time", "clock_offset"},
-    {"curvature_bias", "segment_bias", "single_wheel_toe", "wheel_toe"},
-    {"floor_slope", "tether_pull"},
-    {"tether_drag", "tether_viscous", "tether_weight"},
-    {"camera_scale", "gap_length"},
-    {"hysteresis", "fill_exhaust_asymmetry"},
-    {"curvature_stiffening", "supply_droop", "bending_resistance"},
-    {"viscous_rolling", "stribeck", "slip_rate"},
-)
+# angle at which a member of a pair of look-alikes that is well behind in the screen is refitted all the same:
+# far from the linearisation's point an effect does up to sin^2 of it of something else
+KIN_RAD = 0.8
 Report = Callable[[str], None]
 
 
@@ -289,11 +283,13 @@ class Search:
         best = scores[0].improvement
         limit = min(_CONTENDER * best, max(best - _NEAR, 0.25 * best))
         chosen = [s for s in scores if s.improvement >= limit]
-        classes = [c for c in LOOK_ALIKES if scores[0].candidate.effect in c]
-        for s in scores:
-            alike = any(s.candidate.effect in c for c in classes)
-            if s not in chosen and alike and s.improvement > 0.2 * best and depth == 0:
-                chosen.append(s)
+        if depth == 0:
+            angles = Angles(current.linearisation)
+            for s in scores:
+                if s not in chosen and s.improvement > 0.2 * best:
+                    angle = angles.between(scores[0].candidate, s.candidate)
+                    if angle is not None and angle < KIN_RAD:
+                        chosen.append(s)
         return chosen
 
     def _refit(self, current: Examined, proposals: list[Score], most: int) -> Hypothesis | None:

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from srs_opt.drive.calibration import DriveCalibration, fit_calibration
-from srs_opt.errors import InputError
-from srs_opt.files import read_text
 from srs_opt.gait_map.grid import map_points
-from srs_opt.measurement.bench_files import MAP_COLUMNS
+from srs_opt.measurement.bench_files import read_map_rows
+from srs_opt.problem import Report
 from srs_opt.robot import Robot
-
-_COLUMNS = MAP_COLUMNS[: MAP_COLUMNS.index("replicates")]
+from srs_opt.table import first_error
 
 
 @dataclass(frozen=True)
@@ -25,28 +24,30 @@ class MeasuredMap:
 
 
 def load_measured_map(path: Path | str) -> MeasuredMap:
-    """Read a maps.csv (columns frequency_hz ... radius_sd_m; more columns are ignored).
+    """Read a maps.csv, as a data set's is read.
 
     Raises
     ------
     InputError
         Naming file and line of the first thing that does not fit.
     """
-    lines = [line for line in read_text(path, "a measured map (CSV)").splitlines() if line.strip()]
-    header = lines[0].split(",") if lines else []
-    missing = [c for c in _COLUMNS if c not in header]
-    if missing:
-        raise InputError(f"{path}:1: column '{missing[0]}' is missing (expected {','.join(_COLUMNS)})")
-    rows = []
-    for number, line in enumerate(lines[1:], start=2):
-        cells = dict(zip(header, line.split(",")))
-        try:
-            rows.append([float(cells.get(c) or "nan") for c in _COLUMNS])
-        except ValueError as error:
-            raise InputError(f"{path}:{number}: expected numbers, found '{line[:60]}'") from error
-    if not rows:
-        raise InputError(f"{path}: the measured map has no rows")
-    return MeasuredMap(np.array(rows))
+    path = Path(path)
+    report = Report(path.parent)
+    rows = read_map_rows(path.name, report)
+    first_error(report)
+    return MeasuredMap(
+        np.array(
+            [
+                [
+                    *(row.frequency_hz, row.pressure_kpa, row.offset, row.phase_lag_rad),
+                    *(row.speed_m_s, row.speed_sd_m_s),
+                    math.nan if row.radius_m is None else row.radius_m,
+                    math.nan if row.radius_sd_m is None else row.radius_sd_m,
+                ]
+                for row in rows
+            ]
+        )
+    )
 
 
 def calibrate_drive(robot: Robot, model: str, measured: MeasuredMap) -> DriveCalibration:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -12,16 +13,15 @@ from typing import IO
 import numpy as np
 
 from srs_opt.errors import InputError
-from srs_opt.files import read_text, write_with
+from srs_opt.files import write_with
 from srs_opt.gait import Wave
 from srs_opt.robot import Robot
 from srs_opt.sweep import Resume, sweep
+from srs_opt.table import first_error, read_table
 
+SETTINGS = ("frequency_hz", "pressure_kpa", "offset", "phase_lag_rad")
 COLUMNS = (
-    "frequency_hz",
-    "pressure_kpa",
-    "offset",
-    "phase_lag_rad",
+    *SETTINGS,
     "speed_m_s",
     "turn_rate_rad_s",
     "radius_m",
@@ -126,18 +126,10 @@ def load_map(path: Path | str) -> GaitMap:
     InputError
         Naming file and line of the first row that does not fit.
     """
-    lines = read_text(path, "a gait map (CSV)").splitlines()
-    if not lines or lines[0].split(",") != list(COLUMNS):
-        raise InputError(f"{path}:1: expected the columns {','.join(COLUMNS)}")
-    rows = []
-    for number, line in enumerate(lines[1:], start=2):
-        try:
-            values = [float(v) if v else np.nan for v in line.split(",")]
-        except ValueError as error:
-            raise InputError(f"{path}:{number}: expected numbers, found '{line[:60]}'") from error
-        if len(values) != len(COLUMNS):
-            raise InputError(f"{path}:{number}: expected {len(COLUMNS)} values, found {len(values)}")
-        rows.append(values)
-    if not rows:
-        raise InputError(f"{path}: the map is empty")
-    return GaitMap(np.array(rows))
+    rows, report = read_table(path, COLUMNS)
+    values = [
+        [row.number(c, report, None if k < len(SETTINGS) else math.nan) for k, c in enumerate(COLUMNS)]
+        for row in rows
+    ]
+    first_error(report)
+    return GaitMap(np.array(values))

@@ -30,8 +30,8 @@ def build_parser() -> Parser:
 def run(options: argparse.Namespace) -> Answer:
     """Check the data set; raise when it has errors, after listing all of them."""
     from srs_opt.errors import InputError
-    from srs_opt.measurement.problem import Report
     from srs_opt.measurement.read import read_folder
+    from srs_opt.problem import Report
 
     report = Report(options.dataset)
     dataset = read_folder(options.dataset, report)

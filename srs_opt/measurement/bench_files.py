@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-from srs_opt.measurement.problem import Report
 from srs_opt.measurement.records import (
     CONDITIONS,
     DIRECTIONS,
@@ -19,8 +18,9 @@ from srs_opt.measurement.records import (
     StepTest,
     TowTest,
 )
-from srs_opt.measurement.table import Row, read_rows
+from srs_opt.problem import Report
 from srs_opt.robot import Robot
+from srs_opt.table import Row, read_rows
 
 MAP_COLUMNS = (
     "frequency_hz",
@@ -40,9 +40,16 @@ CHECK_COLUMNS = ("quantity", "value", "sd")
 
 
 def read_maps(robot: Robot, report: Report) -> tuple[MapRow, ...]:
-    """Read maps.csv."""
-    file, rows = "maps.csv", []
-    for row in read_rows("maps.csv", MAP_COLUMNS, (), report):
+    """Read maps.csv, and check that its values can be this robot's."""
+    rows = read_map_rows("maps.csv", report)
+    _check_maps(rows, robot, report)
+    return tuple(rows)
+
+
+def read_map_rows(file: str, report: Report) -> list[MapRow]:
+    """Read a table of measured gaits."""
+    rows = []
+    for row in read_rows(file, MAP_COLUMNS, (), report):
         numbers = {name: row.number(name, report) for name in MAP_COLUMNS[:6]}
         radius = row.number("radius_m", report, math.inf)
         radius_sd = row.number("radius_sd_m", report, math.inf)
@@ -64,8 +71,7 @@ def read_maps(robot: Robot, report: Report) -> tuple[MapRow, ...]:
                 **numbers, radius_m=None if straight else radius, radius_sd_m=sd, replicates=int(replicates)
             )
         )
-    _check_maps(rows, robot, report)
-    return tuple(rows)
+    return rows
 
 
 def _check_maps(rows: list[MapRow], robot: Robot, report: Report) -> None:

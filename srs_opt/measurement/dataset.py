@@ -13,8 +13,8 @@ import numpy as np
 
 from srs_opt.errors import InputError
 from srs_opt.files import write_text, write_with
+from srs_opt.gait_file import SCHEDULE_COLUMNS
 from srs_opt.measurement import bench_files, read
-from srs_opt.measurement.problem import Report
 from srs_opt.measurement.records import (
     CENTRE_OF_MASS,
     CONDITIONS,
@@ -33,6 +33,7 @@ from srs_opt.measurement.records import (
     Trial,
 )
 from srs_opt.measurement.tracks import track_columns
+from srs_opt.problem import Report
 from srs_opt.robot import save_robot
 
 
@@ -79,7 +80,7 @@ def write_dataset(dataset: DataSet, folder: Path | str) -> Path:
         _write_track(trial, folder / "trials" / f"{trial.name}.csv")
     for schedule in {t.schedule.name: t.schedule for t in dataset.trials if t.schedule}.values():
         rows = ((s, _text(on), _text(off), _text(schedule.period_s)) for s, on, off in schedule.intervals)
-        _write_table(folder / "schedules" / f"{schedule.name}.csv", read.SCHEDULE_COLUMNS, rows)
+        _write_table(folder / "schedules" / f"{schedule.name}.csv", SCHEDULE_COLUMNS, rows)
     if dataset.trials:
         _write_trials(dataset.trials, folder / "trials.csv")
     if dataset.maps:

@@ -12,10 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from srs_opt.measurement.chain import Chain
+from srs_opt.measurement.find_chain import find_chain
 from srs_opt.measurement.records import Array
 
 NEAR = 0.45  # of a pitch: farther from its prediction, a position is not this link's
 FARTHEST = 0.9  # of a pitch: the gate of a link that was lost for long
+BLIND = 3  # frames without any position after which the chain is looked for anew
 SLACK = 1.2  # neighbours may not be farther apart than this many pitches
 
 
@@ -109,9 +111,23 @@ def follow(chain: Chain, cloud: Array, start: int, order: np.ndarray) -> np.ndar
     for frames in (range(start + 1, len(cloud)), range(start - 1, -1, -1)):
         last, age = first.copy(), np.where(np.isfinite(first[:, 0]), 0, 10)
         for frame in frames:
-            owners[frame] = _assign(chain, cloud[frame], last, age)
+            owners[frame] = _found_again(chain, cloud[frame], last, age)
+            if (owners[frame] < 0).any():
+                owners[frame] = _assign(chain, cloud[frame], last, age)
             _carry(last, age, cloud[frame], owners[frame])
     return owners
+
+
+def _found_again(chain: Chain, positions: Array, last: Array, age: np.ndarray) -> np.ndarray:
+    """Find the whole chain anew after frames in which it was lost: it has moved on, by a link perhaps."""
+    known = np.isfinite(last[:, 0])
+    if age.min() < BLIND or np.isfinite(positions[:, 0]).sum() < chain.links or known.sum() < 2:
+        return np.full(chain.links, -1)
+    order = find_chain(chain, positions)
+    if order is None:
+        return np.full(chain.links, -1)
+    axis = last[known][-1] - last[known][0]
+    return order if (positions[order[-1]] - positions[order[0]]) @ axis > 0 else order[::-1]
 
 
 def _assign(chain: Chain, positions: Array, last: Array, age: np.ndarray) -> np.ndarray:

@@ -9,21 +9,28 @@ from numpy.typing import NDArray
 
 from srs_opt.errors import NoAnswerError
 from srs_opt.measurement.chain import Chain, chain_of, link_positions
-from srs_opt.measurement.records import Array
+from srs_opt.measurement.records import Array, Schedule
 from srs_opt.measurement.steps import step_response
 from srs_opt.robot import Robot
 
 THRESHOLD = 6.0
 QUIET_FRAMES = 5
 CYCLES = 2.0
+# a fit that leaves more than this share of the shapes' change is not the motion that was asked for: from 0.2
+# a wrong phase lag passes, at 0.5 a robot whose segments differ is refused
+MOST_LEFT = 0.35
 
 
 @dataclass(frozen=True)
 class Onset:
-    """Start of the valves on the camera's clock; a dead time of the valves is part of it."""
+    """Start of the valves on the camera's clock; a dead time of the valves is part of it.
+
+    `doubt` says why the start is bracketed by the first motion; empty when the fit stands.
+    """
 
     time_s: float
     sd_s: float
+    doubt: str = ""
 
 
 @dataclass(frozen=True)
@@ -34,6 +41,14 @@ class Gait:
     pressure_kpa: float
     offset: float
     phase_lag_rad: float
+    schedule: Schedule | None = None
+
+    def states(self, segment: int, time_s: Array) -> Array:
+        """Return S (+1 or -1) of `segment`."""
+        if self.schedule is not None:
+            return self.schedule.state(segment, time_s)
+        wave = np.sin(2 * np.pi * self.frequency_hz * time_s + self.phase_lag_rad * segment)
+        return np.where(wave + self.offset > 0, 1.0, -1.0)
 
 
 def first_curvatures(robot: Robot, gait: Gait, time_s: Array, slowness: float = 1.0) -> Array:
@@ -44,11 +59,10 @@ def first_curvatures(robot: Robot, gait: Gait, time_s: Array, slowness: float = 
     """
     total = robot.tau1_s + robot.tau2_s
     s, q = slowness * total / 2, ((robot.tau1_s - robot.tau2_s) / total) ** 2
-    omega = 2 * np.pi * gait.frequency_hz
     fine = np.arange(1e-6, max(float(time_s[-1]), 1e-3), 2e-4)
     columns = []
     for segment in range(1, robot.links):
-        state = np.where(np.sin(omega * fine + gait.phase_lag_rad * segment) + gait.offset > 0, 1.0, -1.0)
+        state = gait.states(segment, fine)
         column = state[0] * step_response(time_s, s, q)
         for k in np.flatnonzero(np.diff(state)):
             column = column + (state[k + 1] - state[k]) * step_response(time_s - fine[k], s, q)
@@ -67,7 +81,9 @@ def find_onset(robot: Robot, gait: Gait, time_s: Array, markers_m: Array) -> Ons
     """Fit the shapes of the first cycles with those that the valve wave gives, whatever way the robot moves.
 
     Fitted are the start and factors on C0 and on the time constants; position and heading are free in every
-    frame, so friction does not matter.
+    frame, so friction does not matter. The start lies within the take, at most the actuator's settling time
+    before the first motion seen. Where the fit leaves too much, it is the middle of that bracket. The
+    deviation counts neighbouring residuals as the correlated values that they are.
 
     Parameters
     ----------
@@ -103,13 +119,37 @@ def find_onset(robot: Robot, gait: Gait, time_s: Array, markers_m: Array) -> Ons
         kappa = p[1] * first_curvatures(robot, gait, time - p[0], p[2])
         return _shape_gaps(chain, kappa, z)
 
-    grid = centre - settle * np.linspace(0.0, 2.0, 25)
-    best = min(grid, key=lambda start: float((gaps(np.array([start, 1.0, 1.0])) ** 2).sum()))
-    bounds = ([best - settle, 0.3, 0.3], [best + settle, 3.0, 3.0])
-    fit = least_squares(gaps, [best, 1.0, 1.0], bounds=bounds, x_scale=[0.01, 0.1, 0.1], diff_step=1e-5)
+    low, high = max(centre - settle, float(time_s[0])), centre + float(np.median(np.diff(time_s)))
+    grid = np.linspace(low, centre, 25)
+    costs = [float((gaps(np.array([start, 1.0, 1.0])) ** 2).sum()) for start in grid]
+    bounds = ([low, 0.3, 0.3], [high, 3.0, 3.0])
+    fits = [
+        least_squares(gaps, [grid[k], 1.0, 1.0], bounds=bounds, x_scale=[0.01, 0.1, 0.1], diff_step=1e-5)
+        for k in np.argsort(costs)[:6:3]
+    ]
+    fit = min(fits, key=lambda f: float(f.cost))
+    still = _shape_gaps(chain, np.zeros((len(time), chain.links - 1)), z)
+    left = float(np.sqrt(2 * fit.cost / max(float(still @ still), 1e-30)))
+    bracket = (high - low) / np.sqrt(12)
+    edge = min(fit.x[0] - low, high - fit.x[0]) < 1e-6
+    if left > MOST_LEFT or edge:
+        reason = (
+            f"the bends seen are not those of the gait ({100 * left:.0f} % of them are left)"
+            if left > MOST_LEFT
+            else "the best start lies at the end of what the first motion allows"
+        )
+        return Onset((low + high) / 2, float(bracket), reason)
     variance = 2 * fit.cost / max(len(fit.fun) - 3 * len(time) - 3, 1)
-    covariance = np.linalg.pinv(fit.jac.T @ fit.jac) * variance
-    return Onset(float(fit.x[0]), float(np.sqrt(covariance[0, 0])))
+    covariance = np.linalg.pinv(fit.jac.T @ fit.jac) * variance * _correlated(fit.fun, len(time))
+    return Onset(float(fit.x[0]), float(min(np.sqrt(covariance[0, 0]), bracket)))
+
+
+def _correlated(residual: Array, frames: int) -> float:
+    """Return by how much correlation from frame to frame raises a variance: (1 + r)/(1 - r), r at lag one."""
+    rows = residual.reshape(2, frames, -1)
+    r = float((rows[:, 1:] * rows[:, :-1]).sum() / max(float((rows**2).sum()), 1e-30))
+    r = min(max(r, 0.0), 0.98)
+    return (1 + r) / (1 - r)
 
 
 def _shape_gaps(chain: Chain, kappa: Array, z: NDArray[np.complex128]) -> Array:

@@ -9,9 +9,9 @@ from typing import Any
 
 from srs_opt.document import Document, read_yaml, unknown_word
 from srs_opt.errors import InputError
+from srs_opt.gait_file import SCHEDULE_COLUMNS
 from srs_opt.measurement.bench_files import read_bench, read_maps
 from srs_opt.measurement.plausible import check_robot, check_trial_row
-from srs_opt.measurement.problem import Report
 from srs_opt.measurement.records import (
     CENTRE_OF_MASS,
     KINDS,
@@ -21,9 +21,10 @@ from srs_opt.measurement.records import (
     Schedule,
     Trial,
 )
-from srs_opt.measurement.table import Row, read_rows, safe_name
 from srs_opt.measurement.tracks import check_track, read_track
+from srs_opt.problem import Report
 from srs_opt.robot import Robot, robot_from_document, robot_problems, wpi_srs
+from srs_opt.table import Row, read_rows, safe_name
 
 TRIAL_COLUMNS = (
     "trial",
@@ -35,7 +36,6 @@ TRIAL_COLUMNS = (
     "duration_s",
 )
 OPTIONAL_TRIAL_COLUMNS = ("schedule", "tether", "floor", "replicate_of", "kind")
-SCHEDULE_COLUMNS = ("segment", "on_s", "off_s", "period_s")
 
 
 @dataclass(frozen=True)
@@ -229,11 +229,12 @@ def _read_schedule(
             report.error(row.file, row.line, f"schedule: '{text[:60]}' {reason}")
             known[name] = None
         else:
-            known[name] = _parse_schedule(name, file, robot, report)
+            known[name] = parse_schedule(name, file, robot, report)
     return known[name]
 
 
-def _parse_schedule(name: str, file: str, robot: Robot, report: Report) -> Schedule | None:
+def parse_schedule(name: str, file: str, robot: Robot, report: Report) -> Schedule | None:
+    """Read one schedule; None (and a report) when it holds none."""
     rows = read_rows(file, SCHEDULE_COLUMNS, (), report)
     intervals, periods = [], set()
     for row in rows:

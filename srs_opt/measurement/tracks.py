@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from srs_opt.measurement.plausible import factor_of_thousand
-from srs_opt.measurement.problem import Report
 from srs_opt.measurement.records import TAIL_TO_HEAD, Array, Trial
-from srs_opt.measurement.table import NumberTable, read_numbers
+from srs_opt.problem import Report
 from srs_opt.robot import Robot
+from srs_opt.table import NumberTable, read_numbers
 
 MAX_MISSING_ROWS = 5
 FARTHEST_M = 1e5  # from the origin; a fit to 1e308 m ends in not-a-number, not in an answer

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from srs_opt.measurement.problem import Problem, Report
 from srs_opt.measurement.read import read_folder
+from srs_opt.problem import Problem, Report
 
 
 def problems(folder: Path | str) -> list[Problem]:

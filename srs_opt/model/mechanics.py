@@ -78,6 +78,13 @@ class Mechanics(ABC):
         """Return the robot's mass, kg."""
         return ca.sum1(self.mass)
 
+    def normal_force(self) -> ca.SX:
+        """Return the load on each link's wheels, N, (N, 1)."""
+        normal = self.mass * self.parameters["gravity_m_s2"]
+        for effect, e in self.parameters.effects:
+            normal = normal + effect.extra_load(e, self.links) if effect.extra_load else normal
+        return normal
+
     def link_velocities(self, u_x: ca.SX, u_y: ca.SX, yaw_rate: ca.SX) -> Chain:
         """Return the links' velocities in the robot's frame (m/s) and their turn rates (rad/s)."""
         c, d = self.chain, self.chain_rate
@@ -103,13 +110,12 @@ class Mechanics(ABC):
         the room (effects of the room ask for them), (N, 1) each.
         """
         p, n = self.parameters, self.links
-        normal = self.mass * p["gravity_m_s2"]
+        normal = self.normal_force()
         c, s = cos, sin
-        for effect, e in p.effects:
-            normal = normal + effect.extra_load(e, n) if effect.extra_load else normal
-            if effect.wheel_angle:
-                skew = effect.wheel_angle(e, n)
-                c, s = c * ca.cos(skew) - s * ca.sin(skew), s * ca.cos(skew) + c * ca.sin(skew)
+        skews = [effect.wheel_angle(e, n) for effect, e in p.effects if effect.wheel_angle]
+        if skews:
+            skew = sum(skews[1:], skews[0])
+            c, s = cos * ca.cos(skew) - sin * ca.sin(skew), sin * ca.cos(skew) + cos * ca.sin(skew)
         v_t, v_n = c * v.x + s * v.y, c * v.y - s * v.x
         along, across = FRICTION_LAWS[p.structure.friction_law](v_t, v_n, p["friction_speed_m_s"])
         f_t = -p["friction_tangential"] * normal * along

@@ -58,7 +58,9 @@ class Structure:
         InputError
             If the compliant model is asked for a robot without a stiffness.
         """
-        names = tuple(str(e["name"]) for e in dynamic_effects(robot, room=room) if _present(e))
+        present = [str(e["name"]) for e in dynamic_effects(robot, room=room) if _present(e)]
+        # an effect of single places is there once for all of them
+        names = tuple(n for k, n in enumerate(present) if not all_effects()[n].place or n not in present[:k])
         structure = Structure(model or robot.own_model, robot.links, robot.friction_law, names)
         if structure.compliant and not robot.is_soft:
             raise InputError(
@@ -88,15 +90,15 @@ def dynamic_effects(robot: Robot, *, room: bool = True) -> list[Mapping[str, Any
 
     Delays act on the valve schedule and measurement effects on the camera; neither is here.
     """
-    chosen = []
-    for spec in robot.effects:
-        effect = all_effects()[spec["name"]]
-        in_equations = effect.kind != "measurement" and effect.delay is None
-        if in_equations and (room or not effect.knows_the_room):
-            chosen.append(spec)
-    order = list(all_effects())
+    known = all_effects()
+    chosen = [
+        s for s in robot.effects
+        if known[s["name"]].in_equations and (room or not known[s["name"]].knows_the_room)
+    ]  # fmt: skip
+    order = list(known)
     return sorted(
-        chosen, key=lambda s: (order.index(s["name"]), *[float(v) for k, v in s.items() if k != "name"])
+        chosen,
+        key=lambda s: (order.index(s["name"]), *[float(s[p.name]) for p in known[s["name"]].parameters]),
     )
 
 
@@ -125,8 +127,8 @@ class Parameters:
     Attributes
     ----------
     names : tuple of str
-        ``friction_normal``, ..., ``pressure_kpa``, then ``0.tether_drag.force_n`` per effect; place
-        parameters take one entry per segment or link (``1.segment_bias.segment[2]``).
+        ``friction_normal``, ..., ``pressure_kpa``, then ``0.tether_drag.force_n`` per effect; those of
+        effects at single places take one entry per place (``1.segment_bias.bias[2]``).
     vector : SX (n, 1)
     """
 
@@ -138,11 +140,8 @@ class Parameters:
             effect = all_effects().get(name)
             if effect is None:
                 raise UnsupportedEffectError(f"effect '{name}' is not part of any model")
-            own: dict[str, ca.SX] = {}
-            for parameter in effect.parameters:
-                key = f"{index}.{name}.{parameter.name}"
-                size = {"link": structure.links, "segment": structure.segments}.get(parameter.place or "", 1)
-                own[parameter.name] = symbols[key] = ca.SX.sym(key, size)
+            own = effect_symbols(effect, structure.links, f"{index}.")
+            symbols |= {f"{index}.{name}.{part}": symbol for part, symbol in own.items()}
             self.effects.append((effect, own))
         self._symbols = symbols
         self.vector = ca.vertcat(*symbols.values())
@@ -167,18 +166,42 @@ class Parameters:
             values += [_RIGID_N_M2 if value is None else value for value in given]
         values += [pressure_kpa, frequency_hz]
         specs = dynamic_effects(robot, room=True)
-        wanted = [s for s in specs if s["name"] in self.structure.effects]
-        if len(wanted) != len(self.structure.effects):
-            wanted = [s for s in wanted if _present(s)]
-        for (effect, own), spec in zip(self.effects, wanted, strict=True):
-            if spec["name"] != effect.name:
-                raise ValueError(f"robot's effects {wanted} do not match the structure {self.structure}")
-            for parameter in effect.parameters:
-                value = spec[parameter.name]
-                if parameter.place:
-                    weights = np.zeros(own[parameter.name].numel())
-                    weights[int(value) - 1] = 1.0
-                    values += weights.tolist()
-                else:
-                    values.append(float(value))
+        if [s["name"] for s in specs if not _placed(s)] != [
+            n for n in self.structure.effects if not _placed(n)
+        ]:
+            specs = [s for s in specs if _present(s)]
+        for effect, own in self.effects:
+            mine = [s for s in specs if s["name"] == effect.name]
+            if effect.place is not None:
+                values += _over_places(effect, mine, own)
+                continue
+            if not mine:
+                raise ValueError(f"robot's effects {specs} do not match the structure {self.structure}")
+            specs.remove(mine[0])  # of an effect that stands twice each takes its own
+            values += [float(mine[0][name]) for name in own]
         return np.array(values)
+
+
+def effect_symbols(effect: Effect, links: int, prefix: str = "") -> dict[str, ca.SX]:
+    """Return the symbols of an effect's parameters, over all places where it sits at one."""
+    count = effect.place.count(links) if effect.place else 1
+    chosen = [p.name for p in effect.parameters if p is not effect.place]
+    return {name: ca.SX.sym(f"{prefix}{effect.name}.{name}", count) for name in chosen}
+
+
+def _placed(effect: str | Mapping[str, Any]) -> bool:
+    name = effect if isinstance(effect, str) else effect["name"]
+    return all_effects()[name].place is not None
+
+
+def _over_places(effect: Effect, entries: list[Mapping[str, Any]], own: Mapping[str, ca.SX]) -> list[float]:
+    """Return the parameters of an effect at single places, one after the other, over all places."""
+    assert effect.place is not None
+    found: list[float] = []
+    defaults = {p.name: p.default for p in effect.parameters if p is not effect.size}
+    for name, symbol in own.items():
+        vector = [defaults.get(name, 0.0)] * symbol.numel()
+        for entry in entries:
+            vector[int(entry[effect.place.name]) - 1] = float(entry[name])
+        found += vector
+    return found

@@ -24,7 +24,7 @@ from pathlib import Path
 
 import casadi as ca
 
-from srs_opt.model.effects.own import own_effects
+from srs_opt.model.effects.own import registered
 
 FLAGS = ("-O1", "-fPIC", "-shared", "-fno-math-errno")
 
@@ -102,7 +102,7 @@ def shared_library(
     if cc is None:
         return None
     parts = [key, _source_digest(), ca.CasadiMeta.version(), platform.machine(), *cc, *flags]
-    if any(name in key for name in own_effects()):  # their equations are not part of the package's sources
+    if any(name in key for name in registered()):  # their equations are not part of the package's sources
         parts.append(build().serialize())
     path = cache_folder() / f"srs_{hashlib.sha256(chr(0).join(parts).encode()).hexdigest()[:32]}.so"
     if path.exists() and _whole(path):

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from srs_opt.calibrate.coordinates import all_candidates, base_coordinates
+from srs_opt.calibrate.candidates import all_candidates
+from srs_opt.calibrate.coordinates import base_coordinates
 from srs_opt.calibrate.experiment import Experiment, Point
 from srs_opt.calibrate.fit import start_point
 from srs_opt.calibrate.model import Model

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from srs_opt.calibrate.coordinates import all_candidates, base_coordinates
+from srs_opt.calibrate.candidates import all_candidates
+from srs_opt.calibrate.coordinates import base_coordinates
 from srs_opt.calibrate.experiment import Experiment, Point
 from srs_opt.calibrate.fit import start_point
 from srs_opt.calibrate.model import Model
@@ -32,7 +33,7 @@ def test_the_small_structure_gives_the_slopes_of_the_full_one(setting):
     model = experiment.model
     effects = tuple(c for k in all_candidates(model.links) for c in k.sizes)
     nodes = experiment.runs["t"](start.values)
-    seeds = model.seeds(start.values, conditions_of(trial), base)
+    seeds = model.seeds(start.values, conditions_of(trial), base).p
     typical = np.ones(len(base))
     found = []
     for coordinates in (base, (*base, *effects)):
@@ -56,7 +57,7 @@ def test_differences_are_the_tangents_of_the_integration(setting, effects):
     coordinates = (*base, *added)
     nodes = experiment.runs["t"](values)
     structure, kept = model.structure(values, coordinates)
-    seeds = model.seeds(values, conditions_of(trial), coordinates)[kept]
+    seeds = model.seeds(values, conditions_of(trial), coordinates).p[kept]
     typical = np.array([c.typical for c in coordinates])
     found = variation(structure, nodes, nodes.p[kept], seeds, typical, trial.heading_rad)
     kernel, n = tangent_kernel(structure), structure.segments

@@ -12,7 +12,7 @@ from motive_writer import motive_csv
 
 from srs_opt.errors import InputError
 from srs_opt.measurement.dataset import load_dataset
-from srs_opt.measurement.motive import read_take
+from srs_opt.measurement.takes.formats import read_take
 from srs_opt.measurement.validate import problems
 
 FILES = [
@@ -115,4 +115,4 @@ def test_any_bytes_in_a_take(tmp_path, data):
     path = tmp_path / "take.csv"
     path.write_bytes(data.draw(st.sampled_from([raw, before[:cut] + raw + before[cut:], before[:cut] + raw])))
     with contextlib.suppress(InputError):
-        assert read_take(path).marker_positions_m.shape[2] == 3
+        assert read_take(path).marker_positions.shape[2] == 3

@@ -28,7 +28,7 @@ def test_bad_set_lists_all(tmp_path, capsys):
     assert len(json.loads(capsys.readouterr().out)["problems"]) == 2
 
 
-@pytest.mark.parametrize("module", ["srs_opt.measurement", "srs_opt.import_motive"])
+@pytest.mark.parametrize("module", ["srs_opt.measurement", "srs_opt.import_tracks"])
 def test_help_loads_nothing_heavy(module):
     """What makes a start slow is what it imports; a clock would judge the machine's load."""
     import subprocess

@@ -10,13 +10,13 @@ from motive_writer import ROT, motive_csv, take_text
 
 from srs_opt.command import run_command
 from srs_opt.errors import InputError
-from srs_opt.import_motive import build_parser
-from srs_opt.import_motive import run as import_run
+from srs_opt.import_tracks.__main__ import build_parser
+from srs_opt.import_tracks.__main__ import run as import_run
 from srs_opt.measurement.chain import chain_of, link_positions
 from srs_opt.measurement.dataset import load_dataset
 from srs_opt.measurement.find_chain import find_chain
 from srs_opt.measurement.ground import ground_axes
-from srs_opt.measurement.motive import read_take
+from srs_opt.measurement.takes.formats import read_take
 from virtual_lab.simulate import run
 from virtual_lab.trials import Trial as LabTrial
 from virtual_lab.truth import Truth
@@ -139,14 +139,14 @@ def test_rotations_and_raw_markers_are_told_apart(tmp_path):
     take = read_take(path)
     assert take.bodies == ("Snake",)
     assert take.markers == ("Snake:Marker1",)
-    assert np.allclose(take.body_positions_m[0, 0], [0.01, 0.02, 0.03])
-    assert np.allclose(take.marker_positions_m[0, 0], [0.004, 0.005, 0.006])
-    assert np.isnan(take.marker_positions_m[1]).all()
+    assert np.allclose(take.body_positions[0, 0], [10, 20, 30])
+    assert np.allclose(take.marker_positions[0, 0], [4, 5, 6])
+    assert np.isnan(take.marker_positions[1]).all()
     assert (take.name, take.rate_hz) == ("T", 100)
 
 
 BAD = {
-    "no header": ("x,y\n1,2\n", "not a Motive"),
+    "no header": ("a,b\n1,2\n", "not a recording in a known format"),
     "units": ("Format Version,1.22,Length Units,Furlongs\nFrame,Time\n0,0\n", "length units"),
     "no frames": ("Format Version,1.22\n,Type,Marker\n", "Frame"),
     "no rows": ("Format Version,1.22\nFrame,Time,X,Y,Z\n", "no frames"),

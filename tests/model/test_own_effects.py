@@ -10,15 +10,17 @@ import pytest
 
 from srs_opt.errors import InputError
 from srs_opt.gait import published_wave
-from srs_opt.model.effects import all_effects, own, register_effect
-from srs_opt.model.effects.effect import Effect, EffectParameter
+from srs_opt.model.effects import own, register_effect
+from srs_opt.model.effects.effect import Effect
+from srs_opt.model.effects.parameter import EffectParameter, link
 from srs_opt.orbit.steady import steady_gait
 from srs_opt.robot import wpi_srs
 
 ROOT = Path(__file__).resolve().parents[2]
 FILE = """
 from srs_opt.model.effects import register_effect
-from srs_opt.model.effects.effect import Effect, EffectParameter
+from srs_opt.model.effects.effect import Effect
+from srs_opt.model.effects.parameter import EffectParameter
 register_effect(Effect("mud", "ground", (EffectParameter("damping", "N s/m", 0.1, lower=0),),
                        rolling_force=lambda e, v: {sign} * e["damping"] * v))
 """
@@ -29,10 +31,8 @@ SIZE = (EffectParameter("damping", "N s/m", 0.1, lower=0),)
 def registry(monkeypatch):
     """Forget what a test registers."""
     monkeypatch.setattr(own, "_own", {})
-    all_effects.cache_clear()
     yield
     monkeypatch.undo()
-    all_effects.cache_clear()
 
 
 def test_registered_effect_equals_the_built_in_one_it_copies(registry):
@@ -53,12 +53,12 @@ def test_registered_effect_equals_the_built_in_one_it_copies(registry):
         ("My effect", "ground", SIZE, "lower-case"),
         ("mine", "weather", SIZE, "kind must be one of"),
         ("mine", "ground", (), "first parameter"),
-        ("mine", "ground", (EffectParameter("link", "", 1, place="link"),), "first parameter"),
+        ("mine", "ground", (link(),), "first parameter"),
     ],
 )
 def test_impossible_effects_are_refused(registry, name, kind, parameters, words):
     with pytest.raises(InputError, match=words):
-        register_effect(Effect(name, kind, parameters))
+        register_effect(Effect(name, kind, parameters, rolling_force=lambda e, v: -v))
 
 
 def test_same_name_with_another_definition_is_refused(registry):
@@ -75,8 +75,20 @@ def simulate(folder: Path, sign: str) -> tuple[float, int]:
     robot = folder / "robot.yaml"
     robot.write_text("effects: [{name: mud, damping: 0.05}]\n", encoding="utf-8")
     cache = folder / "cache"
-    environment = {**os.environ, "SRS_OPT_EFFECTS": str(folder / "mud.py"), "SRS_OPT_CACHE": str(cache)}
-    command = ["-m", "srs_opt.simulate", "--robot", robot, "--duration", "2", "--json", "--out", folder / "o"]
+    environment = {**os.environ, "SRS_OPT_CACHE": str(cache)}
+    command = [
+        "-m",
+        "srs_opt.simulate",
+        "--plugin",
+        folder / "mud.py",
+        "--robot",
+        robot,
+        "--duration",
+        "2",
+        "--json",
+        "--out",
+        folder / "o",
+    ]
     done = subprocess.run(
         [sys.executable, *map(str, command)],
         cwd=ROOT,
@@ -99,7 +111,6 @@ def test_fingerprint_follows_the_definition(registry, monkeypatch):
     prints = set()
     for factor in (1, 2):
         monkeypatch.setattr(own, "_own", {})
-        all_effects.cache_clear()
         hook = {1: lambda e, v: -e["damping"] * v, 2: lambda e, v: -2 * e["damping"] * v}[factor]
         register_effect(Effect("mine", "ground", SIZE, rolling_force=hook))
         prints.add(wpi_srs().with_values(effects=[{"name": "mine", "damping": 0.1}]).fingerprint())
@@ -114,9 +125,8 @@ def test_bad_file_is_one_line(tmp_path, content):
     robot = tmp_path / "robot.yaml"
     robot.write_text("effects: [{name: mud, damping: 0.05}]\n", encoding="utf-8")
     done = subprocess.run(
-        [sys.executable, "-m", "srs_opt.simulate", "--robot", str(robot), "--out", str(tmp_path / "o")],
+        [sys.executable, "-m", "srs_opt.simulate", "--plugin", str(file), "--robot", str(robot)],
         cwd=ROOT,
-        env={**os.environ, "SRS_OPT_EFFECTS": str(file)},
         capture_output=True,
         text=True,
     )

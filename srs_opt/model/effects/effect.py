@@ -1,36 +1,23 @@
-"""What an effect is: parameters with bounds, and where it enters the model.
+"""What an effect is: everything about it in one object, which every part of the program asks.
 
-Every hook is optional. A hook gets the effect's own parameters `e` (a mapping;
-a place parameter, ``segment`` or ``link``, arrives as a 0/1 weight vector over
-all segments or links, so that one compiled model serves every place).
+Hooks say where it enters the equations; each is optional. A hook gets the effect's own parameters `e` (a
+mapping from name to expression). Parameters of an effect that sits at one place (`Place`) arrive as vectors
+over all segments or links, zero where it does not act, so that one compiled model serves every place.
 """
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
 
+from srs_opt.model.effects.parameter import EffectParameter, Place
+
 Symbols = Mapping[str, ca.SX]
-INFINITY = float("inf")
-
-
-@dataclass(frozen=True)
-class EffectParameter:
-    """One parameter of an effect: its unit, physical bounds and typical size.
-
-    `place` is "segment" or "link" for an integer that says where; otherwise None.
-    """
-
-    name: str
-    unit: str
-    typical: float
-    lower: float = -INFINITY
-    upper: float = INFINITY
-    place: str | None = None
-    exclusive: bool = False
+KINDS = ("tether", "room", "body", "ground", "actuation", "measurement", "clock")
 
 
 @dataclass(frozen=True)
@@ -57,7 +44,18 @@ class Effect:
 
     Attributes
     ----------
-    kind : {"actuation", "body", "ground", "tether", "room", "measurement"}
+    name : str
+    kind : {"tether", "room", "body", "ground", "actuation", "measurement", "clock"}
+        What it acts on. Effects of the room know where the robot is; those of measurement and clock never
+        enter the dynamics.
+    parameters : tuple of EffectParameter
+        The size first. Their kinds say how they are fitted.
+    what, look : str
+        In plain words: what it is; what to look at on the robot to confirm it.
+    instrument : str, optional
+        Quantity of ``bench/checks.csv`` that measures it directly.
+    through_tether : bool
+        Whether trials without a tether are free of it (default: those of kind tether).
     gap_extra, gap_ratio : hooks of the geometry; added to the gap (m) and to the gaps' bending ratio.
     extra_mass, extra_load : hooks; added to link masses (kg, with weight) and to normal forces (N).
     wheel_angle : hook; added to the wheels' angle against their link (rad).
@@ -69,13 +67,18 @@ class Effect:
     restoring : hook (e, kappa, memory); added to the restoring curvature.
     memory_rate : hook (e, dkappa, memory); rate of the effect's own state per segment.
     delay : hook (e); added to the valves' delay, s.
-    marker, camera : hooks of the measurement; see `model.measurement`.
+    marker : hook (e, x, y, theta); where the camera's markers sit, room coordinates (m).
+    camera : hook (e, x, y); where a point of the room is seen (m).
     clock : hook (e); the sample labelled t was taken at t + clock.
     """
 
     name: str
     kind: str
     parameters: tuple[EffectParameter, ...]
+    what: str = ""
+    look: str = ""
+    instrument: str | None = None
+    through_tether: bool | None = None
     gap_extra: Callable[[Symbols], ca.SX] | None = None
     gap_ratio: Callable[[Symbols], ca.SX] | None = None
     extra_mass: Callable[[Symbols, int], ca.SX] | None = None
@@ -101,6 +104,26 @@ class Effect:
         return self.parameters[0]
 
     @property
+    def place(self) -> Place | None:
+        """The parameter that says where it sits, if it sits at one place."""
+        return next((p for p in self.parameters if isinstance(p, Place)), None)
+
+    @property
+    def hooks(self) -> frozenset[str]:
+        """Names of the hooks that it has."""
+        return frozenset(name for name in HOOKS if getattr(self, name) is not None)
+
+    @property
+    def in_equations(self) -> bool:
+        """Whether it enters the equations of motion (delays act on the valves' schedule instead)."""
+        return bool(self.hooks - {"delay", "marker", "camera", "clock"})
+
+    @property
+    def seen_by_camera(self) -> bool:
+        """Whether it changes where points are seen."""
+        return self.marker is not None or self.camera is not None
+
+    @property
     def nonlinear_actuator(self) -> bool:
         """Whether the curvature loses its closed form."""
         return self.slow_down is not None or self.restoring is not None
@@ -109,3 +132,24 @@ class Effect:
     def knows_the_room(self) -> bool:
         """Whether the motion depends on where in the room the robot is (no periodic orbit then)."""
         return self.kind == "room"
+
+    @property
+    def of_tether(self) -> bool:
+        """Whether it acts through the tether, so that trials without one are free of it."""
+        return self.kind == "tether" if self.through_tether is None else self.through_tether
+
+
+HOOKS = tuple(f.name for f in dataclasses.fields(Effect) if str(f.type).startswith("Callable"))
+
+
+def on_link(count: int, index: int, value: Any) -> ca.SX:
+    """Return a vector over all links with `value` on one of them."""
+    vector = ca.SX.zeros(count, 1)
+    vector[index] = value
+    return vector
+
+
+def to_body_frame(fx: ca.SX, fy: ca.SX, heading: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """Return a force that stands in the room's axes in those of a frame at `heading`."""
+    c, s = ca.cos(heading), ca.sin(heading)
+    return c * fx + s * fy, c * fy - s * fx

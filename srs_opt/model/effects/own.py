@@ -1,36 +1,79 @@
-"""A laboratory's own effects: registered from Python, or by files that SRS_OPT_EFFECTS names."""
+"""A laboratory's own effects: registered from Python, by a plugin file, or by an installed package."""
 
 from __future__ import annotations
 
-import dataclasses
 import hashlib
-import importlib.util
 import inspect
-import os
 import re
 import sys
-from functools import lru_cache
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from types import ModuleType
+from typing import Any
 
+from srs_opt import plugins
 from srs_opt.errors import InputError
+from srs_opt.model.effects.effect import HOOKS, KINDS, Effect
+from srs_opt.model.effects.parameter import Component, Direction, Place, Scale, Towards
 
-if TYPE_CHECKING:
-    from srs_opt.model.effects.effect import Effect
-
-VARIABLE = "SRS_OPT_EFFECTS"
-KINDS = ("actuation", "body", "ground", "tether", "room", "measurement")
-_own: dict[str, Effect] = {}
+GROUP = "srs_opt.effects"
 
 
-def own_effects() -> dict[str, Effect]:
-    """Return the registered effects by name, in the order of their registration."""
-    _load_files(os.environ.get(VARIABLE, ""))
+@dataclass(frozen=True)
+class Registered:
+    """An effect of one's own, where it comes from, and a hash of its definition.
+
+    Attributes
+    ----------
+    effect : Effect
+    origin : str or None
+        Plugin file or installed package that defines it; None where it was typed in.
+    definition : str
+    installed : bool
+        Whether every process finds it by itself.
+    """
+
+    effect: Effect
+    origin: str | None
+    definition: str
+    installed: bool = False
+
+
+_own: dict[str, Registered] = {}
+_asked_packages: list[str] = []
+_adopted: set[bytes] = set()
+
+
+def registered() -> dict[str, Registered]:
+    """Return the effects of one's own by name, in the order of their registration."""
+    if not _asked_packages:
+        _asked_packages.append(GROUP)
+        for package, offered in plugins.entry_points(GROUP):
+            # a module registers its effects itself, or holds nothing but effects: take both
+            found = vars(offered).values() if isinstance(offered, ModuleType) else offered
+            effects = found if isinstance(found, Iterable) else (found,)
+            for effect in effects:
+                if isinstance(effect, Effect) and effect.name not in _own:
+                    add(effect, set(), package, installed=True)
     return dict(_own)
 
 
-def add(effect: Effect, built_in: set[str]) -> None:
+def add(
+    effect: Effect, built_in: set[str], origin: str | None = None, *, installed: bool = False
+) -> Registered:
     """Keep `effect`; see `srs_opt.model.effects.register_effect`."""
+    check(effect, built_in)
+    name = effect.name
+    entry = Registered(effect, origin or plugins.running() or _source(effect), definition(effect), installed)
+    if name in _own and _own[name].definition != entry.definition:
+        raise InputError(f"effect '{name}' was registered before with another definition")
+    _own.setdefault(name, entry)
+    return _own[name]
+
+
+def check(effect: Effect, built_in: set[str]) -> None:
+    """Refuse what cannot be an effect."""
     name = effect.name
     if not re.fullmatch(r"[a-z][a-z0-9_]*", name):
         raise InputError(f"effect '{name}': expected a name of lower-case letters, digits and underscores")
@@ -38,44 +81,79 @@ def add(effect: Effect, built_in: set[str]) -> None:
         raise InputError(f"effect '{name}' exists already; choose another name")
     if effect.kind not in KINDS:
         raise InputError(f"effect '{name}': kind must be one of {', '.join(KINDS)}, found '{effect.kind}'")
-    if not effect.parameters or effect.parameters[0].place:
+    kinds = [type(p) for p in effect.parameters]
+    if not kinds or kinds[0] in (Component, Direction, Place, Scale, Towards):
         raise InputError(f"effect '{name}': its first parameter must be a size whose zero means absence")
-    if name in _own and definition(_own[name]) != definition(effect):
-        raise InputError(f"effect '{name}' was registered before with another definition")
-    _own[name] = effect
+    if effect.size.typical == 0:
+        raise InputError(f"effect '{name}': the typical size of '{effect.size.name}' must not be 0")
+    if kinds.count(Place) > 1 or kinds.count(Direction) > 1 or kinds.count(Towards) not in (0, 2):
+        raise InputError(f"effect '{name}': at most one place, one direction, one point (two coordinates)")
+    if not effect.hooks:
+        raise InputError(f"effect '{name}' has no hook: it acts on nothing; hooks are {', '.join(HOOKS)}")
 
 
 def definition(effect: Effect) -> str:
     """Return a hash that changes with the effect's parameters and with the file that defines its hooks."""
-    digest = hashlib.sha256()
-    for field in dataclasses.fields(effect):
-        value = getattr(effect, field.name)
-        if not callable(value):
-            digest.update(f"{field.name}={value!r};".encode())
+    digest = hashlib.sha256(f"{effect.name} {effect.kind} {effect.parameters!r} {effect.of_tether}".encode())
+    for hook in _hooks(effect):
+        digest.update(b"hook")
+        code = getattr(hook, "__code__", None)
+        if code is None:  # an object that can be called
+            digest.update(repr(hook).encode())
             continue
-        digest.update(f"{field.name}:".encode())
-        code = value.__code__
         constants = [c for c in code.co_consts if isinstance(c, (int, float, str, type(None)))]
         digest.update(code.co_code + repr(constants).encode())
-        source = inspect.getsourcefile(value)
+        source = inspect.getsourcefile(hook)
         if source and Path(source).is_file():
             digest.update(Path(source).read_bytes())
     return digest.hexdigest()[:16]
 
 
-@lru_cache(maxsize=8)
-def _load_files(files: str) -> None:
-    """Run every file of a list as PATH's (they call register_effect); worker processes inherit the list."""
-    for number, file in enumerate(filter(None, files.split(os.pathsep))):
-        name = f"srs_opt_own_effects_{number}"
-        spec = importlib.util.spec_from_file_location(name, file)
-        if spec is None or spec.loader is None or not Path(file).is_file():
-            raise InputError(f"{VARIABLE}: {file}: expected a Python file that calls register_effect")
-        module = importlib.util.module_from_spec(spec)
-        sys.modules[name] = module
-        try:
-            spec.loader.exec_module(module)
-        except InputError:
-            raise
-        except Exception as error:
-            raise InputError(f"{VARIABLE}: {file}: {type(error).__name__}: {error}") from error
+def _hooks(effect: Effect) -> list[Callable[..., Any]]:
+    return [getattr(effect, name) for name in sorted(effect.hooks)]
+
+
+def _source(effect: Effect) -> str | None:
+    """Return the name of the file that defines the effect's hooks, if one does."""
+    for hook in _hooks(effect):
+        file = getattr(getattr(hook, "__code__", None), "co_filename", "")
+        if Path(file).is_file():
+            return Path(file).name
+    return None
+
+
+def exported() -> bytes | None:
+    """Return the effects that other processes cannot find by themselves, for `adopt`; None: there are none.
+
+    Hooks travel by value, so that a worker, also on another machine, needs no file of the laboratory's.
+    """
+    own = [r for r in _own.values() if not r.installed]
+    if not own:
+        return None
+    import cloudpickle
+
+    modules = {getattr(hook, "__module__", None) for r in own for hook in _hooks(r.effect)}
+    by_value = [sys.modules[m] for m in modules if m in sys.modules and m.split(".")[0] not in _SHARED]
+    for module in by_value:
+        cloudpickle.register_pickle_by_value(module)
+    try:
+        return bytes(cloudpickle.dumps(own))
+    finally:
+        for module in by_value:
+            cloudpickle.unregister_pickle_by_value(module)
+
+
+_SHARED = ("__main__", "srs_opt", "planners", "casadi")  # main is by value anyway, the others are installed
+
+
+def adopt(effects: bytes) -> None:
+    """Make known what another process exported; what is known already stays."""
+    if effects in _adopted:
+        return
+    import pickle
+
+    for entry in pickle.loads(effects):
+        known = _own.setdefault(entry.effect.name, entry)
+        if known.definition != entry.definition:
+            raise InputError(f"effect '{entry.effect.name}' was registered before with another definition")
+    _adopted.add(effects)

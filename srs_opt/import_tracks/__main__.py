@@ -1,4 +1,4 @@
-"""``python -m srs_opt.import_motive TAKE.csv --trials FILE``: Motive takes become a data set."""
+"""``python -m srs_opt.import_tracks FILE... --trials FILE``: recordings become a data set."""
 
 from __future__ import annotations
 
@@ -12,23 +12,38 @@ from srs_opt.command import Answer, Parser, finite_float, make_parser, positive_
 def build_parser() -> Parser:
     """Return the command's parser."""
     parser = make_parser(
-        "python -m srs_opt.import_motive",
-        "Import OptiTrack Motive CSV exports: markers are found, ordered tail to head, put on the valves'\n"
-        "clock and written as a measured data set. Labels may be unordered, swap, or be missing.\n"
+        "python -m srs_opt.import_tracks",
+        "Import recordings of OptiTrack Motive (CSV), Vicon (CSV), Qualisys (TSV), TRC, C3D, DeepLabCut\n"
+        "(CSV, HDF5), or any table of positions: markers are found, ordered tail to head, put on the\n"
+        "valves' clock and written as a data set. Labels may be unordered, swap, or be missing.\n"
+        "Whatever had to be guessed is said.\n"
         "Columns of the list of trials: trial, frequency_hz, pressure_kpa, offset, phase_lag_rad; optional\n"
-        "take (a take's name; default: the trial's), valve_start_s (on the take's clock), duration_s,\n"
-        "tether, floor, replicate_of, kind.",
-        "python -m srs_opt.import_motive takes/*.csv --trials trials.csv --robot robot.yaml --out mine",
+        "take (a file's or take's name; default: the trial's), valve_start_s (on the take's clock),\n"
+        "schedule (a CSV of switch times beside the list), duration_s, tether, floor, replicate_of, kind.",
+        "python -m srs_opt.import_tracks takes/*.csv --trials trials.csv --robot robot.yaml --out mine",
     )
-    parser.add_argument("takes", type=Path, nargs="+", metavar="TAKE.csv", help="Motive CSV export(s)")
+    parser.add_argument("takes", type=Path, nargs="+", metavar="FILE", help="recordings")
     parser.add_argument("--trials", type=Path, required=True, metavar="FILE", help="list of trials (CSV)")
     parser.add_argument("--name", help="name of the data set (default: the output folder's)")
-    parser.add_argument("--head-marker", metavar="LABEL", help="head's marker (default: the end that leads)")
+    parser.add_argument("--head-marker", metavar="LABEL", help="head's marker (default: told by the bends)")
+    parser.add_argument("--format", default="auto", metavar="NAME", help="files' format (default: found)")
+    parser.add_argument("--columns", type=Path, metavar="MAP.yaml", help="which column of a table is what")
+    parser.add_argument("--rate", type=positive_float, metavar="HZ", help="frames per second, where not told")
+    parser.add_argument(
+        "--scale", type=positive_float, metavar="M", help="metres per unit of the positions (per pixel)"
+    )
+    parser.add_argument(
+        "--least-likelihood",
+        type=finite_float,
+        default=0.6,
+        metavar="P",
+        help="positions that an estimator is less sure of are lost (default 0.6)",
+    )
     parser.add_argument(
         "--up",
         default="auto",
         metavar="AXIS",
-        help="up in Motive's axes: auto, x, y, z, --up=-y, ... (default auto)",
+        help="up in the system's axes: auto, x, y, z, --up=-y, ... (default auto)",
     )
     parser.add_argument(
         "--points",
@@ -52,8 +67,10 @@ def run(options: argparse.Namespace) -> Answer:
     """Import, write, check what was written."""
     from srs_opt.errors import InputError
     from srs_opt.measurement.dataset import write_dataset
-    from srs_opt.measurement.motive import read_take
-    from srs_opt.measurement.motive_import import ImportOptions, import_takes, read_trial_list
+    from srs_opt.measurement.importing import ImportOptions, import_takes, read_schedules, read_trial_list
+    from srs_opt.measurement.takes.columns import load_columns
+    from srs_opt.measurement.takes.formats import read_take
+    from srs_opt.measurement.takes.take import ReadSettings
     from srs_opt.measurement.validate import problems
     from srs_opt.robot import load_robot
 
@@ -61,7 +78,14 @@ def run(options: argparse.Namespace) -> Answer:
         raise InputError(f"{options.out}: already holds a data set; choose another folder with --out")
     robot = load_robot(options.robot)
     rows = read_trial_list(options.trials)
-    takes = [read_take(path) for path in options.takes]
+    schedules = read_schedules(options.trials.parent, rows, robot)
+    reading = ReadSettings(
+        rate_hz=options.rate,
+        scale_m=options.scale,
+        least_likelihood=options.least_likelihood,
+        columns=load_columns(options.columns) if options.columns else None,
+    )
+    takes = [read_take(path, reading, options.format) for path in options.takes]
     settings = ImportOptions(
         head_marker=options.head_marker,
         up=options.up,
@@ -70,7 +94,7 @@ def run(options: argparse.Namespace) -> Answer:
         marker_sd_m=options.marker_sd,
     )
     name = options.name or options.out.resolve().name
-    dataset, notes = import_takes(takes, rows, robot, name, settings)
+    dataset, notes = import_takes(takes, rows, robot, name, settings, schedules)
     write_dataset(dataset, options.out)
     for note in notes:
         for warning in note.warnings:

@@ -11,12 +11,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from srs_opt.document import unknown_word
 from srs_opt.errors import InputError
 from srs_opt.files import read_text
-from srs_opt.measurement.problem import Report
-from srs_opt.measurement.records import Array
+from srs_opt.problem import Report
+
+Array = NDArray[np.float64]
 
 NOT_A_NUMBER = ("", "nan", "na")
 MAX_ROWS = 2_000_000
@@ -73,6 +75,33 @@ def to_number(text: str) -> float | None:
         return float(text)
     except ValueError:
         return None
+
+
+def read_table(
+    path: Path | str, required: Sequence[str], optional: Sequence[str] = ()
+) -> tuple[list[Row], Report]:
+    """Read a table that stands alone: its rows, and a report to read their cells with.
+
+    `first_error` raises what was reported.
+    """
+    path = Path(path)
+    report = Report(path.parent)
+    return read_rows(path.name, required, optional, report), report
+
+
+def first_error(report: Report) -> None:
+    """Raise the first error reported, if there is one.
+
+    Raises
+    ------
+    InputError
+        With file, line and the number of further errors.
+    """
+    errors = report.errors()
+    if errors:
+        more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
+        place = f"{report.folder / errors[0].file}" + (f":{errors[0].line}" if errors[0].line else "")
+        raise InputError(f"{place}: {errors[0].message}{more}")
 
 
 def read_rows(file: str, required: Sequence[str], optional: Sequence[str], report: Report) -> list[Row]:

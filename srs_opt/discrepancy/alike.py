@@ -1,0 +1,91 @@
+"""Which effects act alike on the data at hand: angles between what they do, the fit's freedom removed."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from srs_opt.calibrate.candidates import Candidate
+from srs_opt.calibrate.objective import priors, sum_eliminated
+from srs_opt.discrepancy.screen import Linearisation
+
+# 20 degrees: 0.9 of what one effect does the other can do too. Half leaves out pairs that noisier data would
+# not tell apart; double lists half of all effects.
+ALIKE_RAD = 0.35
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two effects and the angle (rad) between their sensitivities, at the places that are most alike."""
+
+    effects: tuple[str, str]
+    angle_rad: float
+
+
+class Angles:
+    """Angles between candidates' sensitivities in noise units, after projection on all that is fitted.
+
+    Parameters
+    ----------
+    lin : Linearisation
+        With the candidates' sizes among its coordinates.
+    """
+
+    def __init__(self, lin: Linearisation) -> None:
+        self._names = {c.name: k - lin.fitted for k, c in enumerate(lin.coordinates)}
+        self._lower = [c.lower for c in lin.coordinates[lin.fitted :]]
+        size, fitted = len(lin.coordinates), lin.fitted
+        total = sum_eliminated(lin.grams, lin.temper)[:size, :size]
+        precision, _ = priors(lin.coordinates, lin.point)
+        inner = total[:fitted, :fitted] + np.diag(precision[:fitted])
+        cross = total[:fitted, fitted:]
+        self._seen = total[fitted:, fitted:] - cross.T @ np.linalg.pinv(inner, hermitian=True) @ cross
+        self._whole = np.diag(total)[fitted:]
+
+    def columns(self, candidate: Candidate) -> list[int]:
+        """Return where a candidate's sizes are; nothing for one that is fitted or not seen by the data."""
+        own = [self._names.get(c.name, -1) for c in candidate.sizes]
+        if min(own) < 0 or any(self._seen[k, k] <= 1e-9 * self._whole[k] for k in own):
+            return []
+        return own
+
+    def between(self, a: Candidate, b: Candidate) -> float | None:
+        """Return the angle of two candidates, rad; of the nearest directions where they have several sizes.
+
+        Effects that cannot change sign and do opposite things are not alike. None where the data do not see
+        one of them.
+        """
+        first, second = self.columns(a), self.columns(b)
+        if not first or not second:
+            return None
+        cosines = _root(self._seen[np.ix_(first, first)]) @ self._seen[np.ix_(first, second)]
+        cosines = cosines @ _root(self._seen[np.ix_(second, second)])
+        if len(first) == len(second) == 1 and self._lower[first[0]] == self._lower[second[0]] == 0:
+            largest = float(cosines[0, 0])
+        else:
+            largest = float(np.linalg.svd(cosines, compute_uv=False)[0])
+        return float(np.arccos(np.clip(largest, -1.0, 1.0)))
+
+
+def _root(matrix: np.ndarray) -> np.ndarray:
+    """Return the inverse square root of a small positive matrix."""
+    values, vectors = np.linalg.eigh(matrix)
+    return np.asarray(vectors / np.sqrt(np.maximum(values, 1e-300)) @ vectors.T)
+
+
+def alike_pairs(
+    lin: Linearisation, candidates: Sequence[Candidate], most_rad: float = ALIKE_RAD
+) -> tuple[Pair, ...]:
+    """Return the pairs of effects that the data can hardly tell apart, the nearest first."""
+    angles = Angles(lin)
+    best: dict[tuple[str, str], float] = {}
+    for a, b in itertools.combinations(candidates, 2):
+        if a.effect != b.effect:
+            angle = angles.between(a, b)
+            pair = (a.effect, b.effect)
+            if angle is not None and angle <= min(most_rad, best.get(pair, np.inf)):
+                best[pair] = angle
+    return tuple(Pair(pair, angle) for pair, angle in sorted(best.items(), key=lambda item: item[1]))

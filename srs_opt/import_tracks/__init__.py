@@ -1,0 +1,1 @@
+"""Recordings of any camera system become a measured data set."""

@@ -1,0 +1,354 @@
+"""Recordings and a list of trials become a measured data set."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from srs_opt.errors import InputError
+from srs_opt.measurement.chain import Chain, chain_of
+from srs_opt.measurement.direction import head_first
+from srs_opt.measurement.find_chain import best_start
+from srs_opt.measurement.ground import ground_axes, to_ground, without_ghosts
+from srs_opt.measurement.labels import follow, take
+from srs_opt.measurement.onset import Gait, find_onset, noise_sd
+from srs_opt.measurement.read import parse_schedule
+from srs_opt.measurement.records import KINDS, Array, Bench, Check, DataSet, Schedule, Trial
+from srs_opt.measurement.takes.take import Take
+from srs_opt.problem import Report
+from srs_opt.robot import Robot
+from srs_opt.table import Row, first_error, read_table
+
+Points = Literal["auto", "markers", "bodies"]
+SETTINGS = ("frequency_hz", "pressure_kpa", "offset", "phase_lag_rad")
+OPTIONAL = (
+    "take",
+    "heading_rad",
+    "duration_s",
+    "valve_start_s",
+    "schedule",
+    "tether",
+    "floor",
+    "replicate_of",
+    "kind",
+)
+SAME_RATE = 1e-3  # rates found from rounded times differ by less
+SCALES = ((1.0, "metres"), (1e-3, "millimetres"), (1e-2, "centimetres"), (0.0254, "inches"))
+
+
+@dataclass(frozen=True)
+class ImportOptions:
+    """How to read the takes.
+
+    Attributes
+    ----------
+    head_marker : str or None
+        Label of the head's marker; without it the bends' phases and the direction of motion tell.
+    up : str
+        Direction up in the system's axes (`srs_opt.measurement.ground.ground_axes`).
+    points : {"auto", "markers", "bodies"}
+        Follow markers, or the pivots of rigid bodies; auto takes bodies when there is one per link.
+    valve_start_s : float or None
+        Valves' start on the take's clock, for all takes; the trials' own column valve_start_s wins.
+    marker_sd_m : float or None
+        Noise of a coordinate; estimated from the tracks when not given.
+    """
+
+    head_marker: str | None = None
+    up: str = "auto"
+    points: Points = "auto"
+    valve_start_s: float | None = None
+    marker_sd_m: float | None = None
+
+
+@dataclass(frozen=True)
+class TrialNote:
+    """What was found out about one trial."""
+
+    trial: str
+    take: str
+    valve_start_s: float
+    valve_start_sd_s: float | None
+    lost_fraction: float
+    ghosts: int
+    warnings: tuple[str, ...]
+
+
+def read_trial_list(path: Path) -> list[Row]:
+    """Read the list of trials: trial, frequency_hz, pressure_kpa, offset, phase_lag_rad and optional columns.
+
+    Raises
+    ------
+    InputError
+        For the first problem found, with the number of others.
+    """
+    rows, report = read_table(path, ("trial", *SETTINGS), OPTIONAL)
+    lines: dict[str, int] = {}
+    for row in rows:
+        free = bool(row.text("schedule")) or row.text("kind") not in ("", "gait")
+        for column in SETTINGS:
+            row.number(column, report, 0.0 if free else None)
+        for column in ("heading_rad", "duration_s", "valve_start_s"):
+            row.number(column, report, 0.0)
+        row.word("kind", KINDS, "gait", report)
+        row.yes("tether", True, report)
+        name = row.text("trial").casefold()
+        if name in lines:
+            report.error(row.file, row.line, f"trial '{name[:60]}' is already on line {lines[name]}")
+        lines.setdefault(name, row.line)
+    first_error(report)
+    return rows
+
+
+def read_schedules(folder: Path, rows: Sequence[Row], robot: Robot) -> dict[str, Schedule]:
+    """Read the schedules that the list of trials names, from its folder or the folder schedules in it.
+
+    Raises
+    ------
+    InputError
+        If one is missing or faulty.
+    """
+    found: dict[str, Schedule] = {}
+    for row in rows:
+        text = row.text("schedule")
+        if not text or text in found:
+            continue
+        name = text.removesuffix(".csv")
+        places = [p for p in (folder / f"{name}.csv", folder / "schedules" / f"{name}.csv") if p.is_file()]
+        if not places:
+            raise InputError(f"{folder / row.file}:{row.line}: schedule: there is no file {name}.csv")
+        report = Report(places[0].parent)
+        schedule = parse_schedule(places[0].stem, places[0].name, robot, report)
+        first_error(report)
+        if schedule is not None:
+            found[text] = schedule
+    return found
+
+
+def import_takes(
+    takes: Sequence[Take],
+    rows: Sequence[Row],
+    robot: Robot,
+    name: str,
+    options: ImportOptions,
+    schedules: Mapping[str, Schedule] | None = None,
+) -> tuple[DataSet, tuple[TrialNote, ...]]:
+    """Return the data set that takes and trials make, and a note on each trial.
+
+    Raises
+    ------
+    InputError
+        If a trial has no take, or the robot cannot be found in one.
+    """
+    rates = {round(t.rate_hz, 6) for t in takes}
+    if max(rates) / min(rates) > 1 + SAME_RATE:
+        raise InputError(f"the takes have different frame rates ({', '.join(map(str, sorted(rates)))} Hz)")
+    trials, notes = [], []
+    for row in rows:
+        key = row.text("take") or row.text("trial")
+        found = _take_called(key, takes, row, alone=len(rows) == 1)
+        trial, note = import_trial(found, row, robot, options, (schedules or {}).get(row.text("schedule")))
+        trials.append(trial)
+        notes.append(note)
+    sds = [noise_sd(t.markers_m) for t in trials if t.markers_m is not None]
+    sd = options.marker_sd_m or max(float(np.median(sds)), 1e-6)
+    spreads = [n.valve_start_sd_s for n in notes if n.valve_start_sd_s is not None]
+    checks = (Check("clock_alignment_s", 0.0, float(np.median(spreads))),) if spreads else ()
+    dataset = DataSet(
+        name=name,
+        robot=robot,
+        rate_hz=takes[0].rate_hz,
+        marker_sd_m=float(f"{sd:.3g}"),
+        trials=tuple(trials),
+        bench=Bench(checks=checks),
+    )
+    return dataset, tuple(notes)
+
+
+def _take_called(key: str, takes: Sequence[Take], row: Row, *, alone: bool) -> Take:
+    """Return the take of a trial: by the file's name first, more often unique than the take's own."""
+    for named in (lambda t: (t.source.name, t.source.stem), lambda t: (t.name,)):
+        found = [t for t in takes if key in named(t)]
+        if len(found) > 1:
+            files = ", ".join(str(t.source) for t in found)
+            raise InputError(
+                f"{row.file}:{row.line}: {len(found)} takes are called '{key[:60]}' ({files}); "
+                "name the file in the column take"
+            )
+        if found:
+            return found[0]
+    if alone and len(takes) == 1:
+        return takes[0]
+    known = ", ".join(sorted({t.source.stem for t in takes}))
+    raise InputError(f"{row.file}:{row.line}: no take is called '{key[:60]}' (takes: {known})")
+
+
+def import_trial(
+    source: Take, row: Row, robot: Robot, options: ImportOptions, schedule: Schedule | None = None
+) -> tuple[Trial, TrialNote]:
+    """Find the robot in one take, order its markers tail to head, and put it on the valves' clock."""
+    chain = chain_of(robot)
+    warnings: list[str] = list(source.told)
+    labels, positions = _points(source, chain, options)
+    cloud, found = _scaled(source, chain, positions, options.up, warnings)
+    counts = np.isfinite(positions[..., 0]).sum(axis=1)
+    seen, usual = int(counts.sum()), int(np.median(counts[counts > 0]))
+    if usual > chain.links:
+        raise InputError(
+            f"{source.source}: most frames show {usual} positions, the robot has {chain.links} links: one "
+            "marker on the centre of every link is needed; leave the others out (a table: --columns)"
+        )
+    frame, order = found
+    owners = follow(chain, cloud, frame, order)
+    tracks = take(cloud, owners)
+    report = Report(Path("."))
+    ends = (labels[order[0]], labels[order[-1]])
+    frequency, lag = (row.number(name, report, 0.0) for name in ("frequency_hz", "phase_lag_rad"))
+    if head_first(chain, ends, source.time_s, tracks, frequency, lag, options.head_marker, warnings):
+        tracks = np.ascontiguousarray(tracks[:, ::-1])
+    start, start_sd = _valve_start(source, row, robot, tracks, options, schedule, warnings)
+    if start < source.time_s[0] - 0.5 / source.rate_hz:
+        warnings.append(
+            f"the take begins {source.time_s[0] - start:.3g} s after the valves: "
+            "calibrate and discrepancy take the robot for straight and at rest when they start"
+        )
+    trial = _cut(source, row, tracks, start, report, schedule)
+    _check_turn(trial, warnings)
+    ghosts = seen - int((owners >= 0).sum())
+    note = TrialNote(trial.name, source.name, start, start_sd, trial.lost_fraction, ghosts, tuple(warnings))
+    return trial, note
+
+
+def _points(source: Take, chain: Chain, options: ImportOptions) -> tuple[tuple[str, ...], Array]:
+    bodies = options.points == "bodies" or (options.points == "auto" and len(source.bodies) == chain.links)
+    labels = source.bodies if bodies else source.markers
+    positions = source.body_positions if bodies else source.marker_positions
+    if len(labels) < chain.links or positions is None:
+        kind = "rigid bodies" if bodies else "markers"
+        raise InputError(
+            f"{source.source}: holds {len(labels)} {kind}, the robot has {chain.links} links "
+            "(one marker on the centre of every link is needed)"
+        )
+    return labels, positions
+
+
+def _scaled(
+    source: Take, chain: Chain, positions: Array, up: str, warnings: list[str]
+) -> tuple[Array, tuple[int, np.ndarray]]:
+    """Return positions in the ground plane in metres, and where the chain was found.
+
+    A scale that the file does not tell is the unit in which a chain is found.
+
+    Raises
+    ------
+    InputError
+        If no frame shows the robot.
+    """
+    axes, normal = ground_axes(positions, "z" if source.flat and up == "auto" else up)
+    if source.scale_m is None and source.pixels:
+        raise InputError(f"{source.source}: positions in pixels; give --scale M{_pixels(chain, positions)}")
+    scales = ((source.scale_m, ""),) if source.scale_m else SCALES
+    for scale, unit in scales:
+        metres = positions * scale
+        cloud = to_ground(without_ghosts(metres, normal, chain.pitch_m / 2), axes)
+        found = best_start(chain, cloud)
+        if found is not None:
+            if unit:
+                warnings.append(f"the file states no units: taken as {unit}, for the markers' spacing")
+            return cloud, found
+    raise InputError(
+        f"{source.source}: no frame shows {chain.links} markers in a row, {chain.pitch_m:g} m apart "
+        f"(is it this robot, are the units right, is the ground plane seen from above?)"
+    )
+
+
+def _pixels(chain: Chain, positions: Array) -> str:
+    """Return what the spacing of neighbouring columns makes of a picture's scale, in words."""
+    chords = np.linalg.norm(np.diff(positions, axis=1), axis=2)
+    if not np.isfinite(chords).any():
+        return ""
+    scale = chain.pitch_m / float(np.nanquantile(chords, 0.9))
+    return f" per pixel (from the markers' spacing it would be about {scale:.2g}; better from a ruler)"
+
+
+def _valve_start(
+    source: Take,
+    row: Row,
+    robot: Robot,
+    tracks: Array,
+    options: ImportOptions,
+    schedule: Schedule | None,
+    warnings: list[str],
+) -> tuple[float, float | None]:
+    if row.text("valve_start_s"):
+        return float(row.text("valve_start_s")), None
+    if options.valve_start_s is not None:
+        return options.valve_start_s, None
+    if row.text("kind") in ("still", "tow", "push"):
+        return 0.0, None
+    values = [row.number(name, Report(Path(".")), 0.0) for name in SETTINGS]
+    if schedule is not None:
+        values[0] = 1 / schedule.period_s
+    onset = find_onset(
+        robot, Gait(values[0], values[1], values[2], values[3], schedule), source.time_s, tracks
+    )
+    if onset.doubt:
+        warnings.append(f"{onset.doubt}: the start is known from the first motion alone; give valve_start_s")
+    return onset.time_s, onset.sd_s
+
+
+def _cut(
+    source: Take, row: Row, tracks: Array, start: float, report: Report, schedule: Schedule | None
+) -> Trial:
+    """Cut the trial out of the take: from the valves' start, tail at the origin, room axes kept."""
+    step = 1 / source.rate_hz
+    time = source.time_s - start
+    duration = row.number("duration_s", report, math.inf)
+    window = (time >= -0.5 * step) & (time < duration - 0.5 * step)
+    if window.sum() < 4:
+        raise InputError(f"{source.source}: the valves start at {start:g} s, after the take's end")
+    rest = tracks[source.time_s <= max(start, source.time_s[4])]
+    seen = np.isfinite(rest[..., 0]).any(axis=0)
+    if not seen[[0, -1]].all():
+        raise InputError(f"{source.source}: tail or head is not seen before the valves start")
+    tail, head = (np.nanmedian(rest[:, i], axis=0) for i in (0, -1))
+    heading = math.atan2(head[1] - tail[1], head[0] - tail[0])
+    values = {name: row.number(name, report, 0.0) for name in SETTINGS}
+    if schedule is not None and values["frequency_hz"] <= 0:
+        values["frequency_hz"] = 1 / schedule.period_s
+    return Trial(
+        name=row.text("trial"),
+        frequency_hz=values["frequency_hz"],
+        pressure_kpa=values["pressure_kpa"],
+        offset=values["offset"],
+        phase_lag_rad=values["phase_lag_rad"],
+        heading_rad=heading,
+        duration_s=round(float(time[window][-1]) + step, 6),
+        time_s=time[window],
+        markers_m=tracks[window] - tail,
+        schedule=schedule,
+        tether=row.yes("tether", True, report),
+        floor=row.text("floor") or None,
+        replicate_of=row.text("replicate_of") or None,
+        kind=row.text("kind") or "gait",
+    )
+
+
+def _check_turn(trial: Trial, warnings: list[str]) -> None:
+    """A positive offset turns left: a robot that turns the other way was seen from below."""
+    points = trial.markers_m
+    if points is None or abs(trial.offset) < 0.15 or trial.kind != "gait":
+        return
+    axis = points[:, -1] - points[:, 0]
+    angle = np.arctan2(axis[:, 1], axis[:, 0])
+    angle = np.unwrap(angle[np.isfinite(angle)])
+    turned = (
+        float(angle[-len(angle) // 4 :].mean() - angle[: len(angle) // 4].mean()) if len(angle) > 8 else 0.0
+    )
+    if abs(turned) > 0.2 and turned * trial.offset < 0:
+        warnings.append("turns against its offset: is the plane seen from above (--up), head and tail right?")

@@ -1,0 +1,1 @@
+"""Recordings of positions as camera systems export them: one reader per format, one registry."""
