@@ -351,7 +351,7 @@ def _check_rest(trial: Trial, warnings: list[str]) -> None:
     bends = np.abs(np.mod(np.diff(angle, axis=1) + np.pi, 2 * np.pi) - np.pi)
     if np.isfinite(bends).any() and float(np.nanmax(bends)) > MOST_BENT_RAD:
         warnings.append(
-            f"the robot is bent by {np.nanmax(bends):.2g} rad at the valves' start: calibrate and discrepancy "
+            f"the robot is bent by {np.nanmax(bends):.2g} rad at the valves' start: the fits "
             "take it for straight and at rest then (a take that begins in mid-gait does not fit)"
         )
 
