@@ -52,7 +52,9 @@ def add_planning_options(parser: Parser) -> None:
     parser.add_argument(
         "--gaits", type=Path, metavar="FILE", help="gait table (default: the one built for this robot)"
     )
-    parser.add_argument("--planner", choices=PLANNERS, default="auto", help="default auto: a portfolio")
+    parser.add_argument(
+        "--planner", type=str.lower, choices=PLANNERS, default="auto", help="default auto: a portfolio"
+    )
     parser.add_argument("--start", type=pose_option, metavar="X,Y,HEADING", help="in place of the maze's")
     parser.add_argument("--goal", type=goal_option, metavar="X,Y[,RADIUS]", help="in place of the maze's")
     parser.add_argument(
