@@ -29,7 +29,7 @@ class Tolerant(doctest.OutputChecker):
 @pytest.fixture
 def desk(tmp_path, monkeypatch) -> Path:
     """A folder to work in that looks like the project's to the commands."""
-    for name in ("mazes", "examples", "virtual_lab", "docs"):
+    for name in ("mazes", "examples", "virtual_lab", "docs", "firmware"):
         (tmp_path / name).symlink_to(ROOT / name)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("PATH", f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
