@@ -29,16 +29,6 @@ KINDS = ("null", "typical", "third", "unlisted", "triple")
 # as many nulls as a false-alarm rate needs; every effect three times, twice at a third of its size
 SHARES = {"null": 300 / 475, "typical": 75 / 475, "third": 50 / 475, "unlisted": 44 / 475, "triple": 6 / 475}
 TRIPLE = ("gap_bending", "tether_weight", "segment_bias")
-# what counts as the right class when the name itself is not it
-CLASSES = (
-    {"dead_time", "clock_offset"},
-    {"curvature_bias", "segment_bias", "single_wheel_toe", "wheel_toe"},
-    {"floor_slope", "tether_pull"},
-    {"tether_drag", "tether_viscous", "tether_weight"},
-    {"camera_scale", "gap_length"},
-    {"hysteresis", "fill_exhaust_asymmetry"},
-    {"curvature_stiffening", "supply_droop", "bending_resistance"},
-)
 Row = dict[str, Any]
 
 
@@ -102,6 +92,7 @@ def examine(kind: str, hidden: tuple[str, ...], seed: int) -> Row:
             "named": sorted(e["name"] for e in said["effects"]),
             "effects": said["effects"],
             "alternatives": said["alternatives"],
+            "alike": said["alike"],
             "ratio": said["gap"]["ratio"] if said["gap"] else None,
             "top": [c["name"] for c in said["candidates"][:3]],
             "next": said["next_experiment"],
@@ -129,14 +120,15 @@ def right_name(row: Row) -> bool:
 
 
 def right_class(row: Row) -> bool:
-    """Whether the hidden effect, or a look-alike, is among what is said."""
+    """Whether the hidden effect, or one that acts alike on that set, is among what is said."""
     if row["verdict"] not in ("named", "one_of"):
         return False
     hidden = sorted(set(row["hidden"]))
+    alike = [set(pair["effects"]) for pair in row.get("alike", ())]
     for said in (row["named"], *row["alternatives"]):
         if sorted(said) == hidden:
             return True
-        if len(said) == len(hidden) == 1 and any({said[0], hidden[0]} <= c for c in CLASSES):
+        if len(said) == len(hidden) == 1 and {said[0], hidden[0]} in alike:
             return True
     return False
 

@@ -206,12 +206,6 @@ def robot_from_document(document: Document) -> Robot:
         from srs_opt.model.effects.entries import check_body
 
         check_body(document, robot.effects, robot.links, robot.link_mass_kg, robot.gap_length_m)
-    if robot.friction_normal < robot.friction_tangential:
-        raise document.error(
-            ("friction_normal",),
-            f"must be at least friction_tangential ({robot.friction_tangential:g}): "
-            "wheels slide across more easily than they roll?",
-        )
     return robot
 
 

@@ -61,6 +61,9 @@ class Foresight:
         self._prior = np.zeros(len(self._runs))
         if not robot.is_soft:
             self._prior[len(FRICTIONS) :] = UNLIKELY
+        # how each suspect's body is bent by now, for the state that the last cycle ended with
+        self._now = np.zeros(0)
+        self._bends: dict[Integrator, Array] = {}
 
     @property
     def _misses(self) -> Array:
@@ -88,15 +91,27 @@ class Foresight:
             for outcome in foreseen
         ]
         self._seen = FADING * self._seen + [_miss(outcome, after) for outcome in bent]
+        self._now = after.copy()
+        self._bends = {
+            run: outcome.final[run.layout.kappa.start : run.layout.dkappa.stop]
+            for run, outcome in zip(self._runs, foreseen)
+            if run.layout.compliant and not isinstance(outcome, NoAnswerError)
+        }
 
     def _bent(self, trajectory: Trajectory, cycle: Cycle | None) -> Trajectory:
         return trajectory if cycle is None else self.problem.bent(trajectory, *cycle)
 
     def _begun(self, run: Integrator, state: Array) -> Array:
-        """Return the planned robot's state as a suspect's model has it."""
+        """Return the planned robot's state as a suspect's model has it.
+
+        A rigid plan's state does not know how a soft body is bent; the suspect's own last cycle does.
+        """
         if run.layout == self.problem.run.layout:
             return state
-        return run.layout.adopt(state, self.problem.run.layout)
+        begun = run.layout.adopt(state, self.problem.run.layout)
+        if run in self._bends and np.array_equal(state, self._now):
+            begun[run.layout.kappa.start : run.layout.dkappa.stop] = self._bends[run]
+        return begun
 
     def room_m(
         self, state: Array, timeline: Timeline, suspect: int | None = None, cycle: Cycle | None = None

@@ -52,7 +52,9 @@ def add_planning_options(parser: Parser) -> None:
     parser.add_argument(
         "--gaits", type=Path, metavar="FILE", help="gait table (default: the one built for this robot)"
     )
-    parser.add_argument("--planner", choices=PLANNERS, default="auto", help="default auto: a portfolio")
+    parser.add_argument(
+        "--planner", type=str.lower, choices=PLANNERS, default="auto", help="default auto: a portfolio"
+    )
     parser.add_argument("--start", type=pose_option, metavar="X,Y,HEADING", help="in place of the maze's")
     parser.add_argument("--goal", type=goal_option, metavar="X,Y[,RADIUS]", help="in place of the maze's")
     parser.add_argument(
@@ -116,6 +118,7 @@ def add_planning_options(parser: Parser) -> None:
 def run(options: argparse.Namespace) -> Answer:
     """Plan, certify, explain, drive, draw."""
     from planners.plan.inputs import problem_from
+    from planners.plan.looks import looks
     from planners.plan.portfolio import Wish, solve
     from planners.view.animation_path import check_animation_path
     from srs_opt.files import write_json
@@ -133,11 +136,14 @@ def run(options: argparse.Namespace) -> Answer:
     if result.plan is None:
         files += _explain(options, problem, result, record)
     else:
+        between = looks(problem, result.plan)
+        record["looks"] = between.to_record()
         execution = _drive(options, problem, result, record, true_robot)
         files += _pictures(options, problem, result, execution)
     files.append(write_json(options.out / "plan.json", record))
     good = result.plan is not None and (execution is None or execution.reached)
-    return Answer(record, _summary(record), good, tuple(files))
+    words = _summary(record, None if result.plan is None else between.in_words())
+    return Answer(record, words, good, tuple(files))
 
 
 def _explain(
@@ -189,7 +195,7 @@ def _pictures(
     return files
 
 
-def _summary(record: dict[str, Any]) -> str:
+def _summary(record: dict[str, Any], between: str | None) -> str:
     """Return the answer in words."""
     if record["status"] != "solved":
         return f"{record['status']}: {record['reason']} ({record['planning_s']:.2f} s)"
@@ -198,6 +204,8 @@ def _summary(record: dict[str, Any]) -> str:
         f"{record['duration_s']:.1f} s, {sum(s['cycles'] for s in record['steps'])} cycles, clearance "
         f"at least {1e3 * record['clearance_m']:.1f} mm, certified"
     ]
+    if between is not None:
+        lines.append(between)
     if execution := record.get("execution"):
         lines.append(
             f"driven: {execution['reason']}; {execution['duration_s']:.1f} s, "

@@ -12,7 +12,7 @@ import numpy as np
 from planners.plan.certify import Certificate
 from planners.search.problem import Problem
 
-Status = Literal["solved", "infeasible", "timeout"]
+Status = Literal["solved", "infeasible", "not_found", "timeout"]
 PATH_STEP_S = 0.05  # of the path in the record
 
 
@@ -86,7 +86,8 @@ class PlanResult:
 
     Attributes
     ----------
-    status : {"solved", "infeasible", "timeout"}
+    status : {"solved", "infeasible", "not_found", "timeout"}
+        Infeasible only with a proof: walls that separate start and goal, or a place narrower than the body.
     plan : Plan or None
     reason : str or None
         In words, when not solved.

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from planners.search.problem import Problem
+from planners.maze.places import RobotSize
+from planners.search.problem import ROUNDING_M, Problem
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait
 from srs_opt.orbit.steady import steady_gait
@@ -55,12 +56,16 @@ class Explanation:
         Body width and margins: no gait can do with less.
     outside_needs_m : float or None
         The least that a weaker gait outside the table needs.
+    start_clearance_m, margin_m : float
+        Of the straight robot at the start; what is to be kept.
     """
 
     tightest: Tightest | None
     needs: tuple[tuple[str, float], ...]
     body_needs_m: float
     outside_needs_m: float | None
+    start_clearance_m: float
+    margin_m: float
 
     @property
     def too_narrow(self) -> bool:
@@ -71,6 +76,14 @@ class Explanation:
         """Return the explanation in a few sentences, `what` first."""
         said = [f"{what}." if what else ""]
         t = self.tightest
+        if self.start_clearance_m < self.margin_m - ROUNDING_M:
+            said.append(
+                f"The start breaks the margin: the straight robot is {1e3 * self.start_clearance_m:.1f} mm "
+                f"from a wall there, and {1e3 * self.margin_m:.1f} mm are to be kept; move the start or "
+                "choose a smaller --margin."
+            )
+            if t is not None:  # the tightest place would be the start's doing
+                return " ".join(said).strip()
         if t is None:
             return " ".join([*said, "Walls separate the start from the goal completely."]).strip()
         said.append(
@@ -84,9 +97,10 @@ class Explanation:
         )
         if not self.too_narrow:
             said.append(
-                "So it is not the width alone: the turns are too tight, or there is no room to turn round"
+                "So the widths alone do not rule a way out; what was tried found none, which is no proof "
+                "that there is none."
             )
-            return " ".join(said).strip() + "."
+            return " ".join(said).strip()
         if t.width_m < self.body_needs_m:
             said.append(
                 f"No gait at all would fit: the body and its margins are {self.body_needs_m:.3f} m wide. "
@@ -122,7 +136,15 @@ def explain(problem: Problem) -> Explanation:
     outside = None
     if tightest is not None and body <= tightest.width_m < needs[0][1]:
         outside = _slimmest_outside(problem, needs[0][0])
-    return Explanation(tightest, needs, body, outside)
+    size = RobotSize(problem.robot.length_m, problem.robot.body_width_m / 2, problem.margin_m)
+    room = problem.maze.clearance(size.straight_body(problem.start))
+    return Explanation(tightest, needs, body, outside, room, problem.margin_m)
+
+
+def no_body_fits(problem: Problem) -> bool:
+    """Whether walls separate start and goal, or even the widest route is narrower than the body needs."""
+    tightest = tightest_place(problem)
+    return tightest is None or tightest.width_m < problem.robot.body_width_m + 2 * problem.margin_m
 
 
 def narrower_than_any_gait(problem: Problem) -> bool:

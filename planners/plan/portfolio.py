@@ -18,7 +18,7 @@ from multiprocessing import get_context
 
 from planners.plan.answer import Plan, PlanResult
 from planners.plan.certify import certify
-from planners.plan.solve import BEAM, LatticeSolver
+from planners.plan.solve import BEAM, LEAST_SLACK_M, TOO_NARROW, LatticeSolver
 from planners.search.lattice import LatticeSettings
 from planners.search.problem import Problem
 from planners.search.tree import Step
@@ -75,7 +75,7 @@ def _rounds(problem: Problem, wish: Wish, tell: Tell) -> PlanResult:
     # the second search tells places near walls apart more finely: slower, but it threads needles
     fine = LatticeSolver(
         problem,
-        LatticeSettings(most_halvings=HALVINGS),
+        LatticeSettings(most_halvings=HALVINGS, by_heading=True, slack_m=LEAST_SLACK_M),
         beams=(),
         time_limit_s=wish.time_limit_s,
         tell=tell,
@@ -84,8 +84,10 @@ def _rounds(problem: Problem, wish: Wish, tell: Tell) -> PlanResult:
     for turn in range(ROUNDS):
         for solver in (lattice, fine):
             result = solver.run(FIRST_NODES * 2**turn)
-            if result.plan is not None or result.status == "infeasible":
+            if result.plan is not None or result.status == "infeasible" or result.reason == TOO_NARROW:
                 return result
+        if lattice.ended and fine.ended:
+            return result
         left = wish.time_limit_s - (time.perf_counter() - began)
         if left <= 0:
             return result
@@ -138,8 +140,10 @@ def _ompl_alone(problem: Problem, wish: Wish, tell: Tell) -> PlanResult:
         if plan is not None:
             return PlanResult("solved", plan, None, 0.0, {"iterations": iterations})
         tell(f"{wish.planner}: no certified plan in {iterations} iterations")
-    reason = f"{wish.planner} found no plan that passes the certificate"
-    return PlanResult("timeout", None, reason, 0.0, {"rounds": turn + 1})
+    late = time.perf_counter() - began >= wish.time_limit_s
+    within = f"within the time limit of {wish.time_limit_s:g} s" if late else f"in {ROUNDS} rounds"
+    reason = f"{wish.planner} found no plan that passes the certificate {within}; other planners may"
+    return PlanResult("timeout" if late else "not_found", None, reason, 0.0, {"rounds": turn + 1})
 
 
 def ompl_gaits(problem: Problem, planner: str, iterations: int, seed: int) -> tuple[int, ...] | None:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
 
 from planners.plan.answer import Plan, PlanResult, Status
 from planners.plan.certify import Certificate, Certifier
-from planners.plan.explain import narrower_than_any_gait
+from planners.plan.explain import narrower_than_any_gait, no_body_fits
 from planners.search.beam import BeamSearch, BeamSettings
 from planners.search.lattice import LatticeSearch, LatticeSettings
 from planners.search.problem import ROUNDING_M, Problem
@@ -20,6 +21,9 @@ TOO_NARROW = "no way with these gaits: even the widest route is too narrow for e
 BACK = 3  # cycles before a failure from where the way is searched again, more at every attempt
 ATTEMPTS = 12
 MORE_SLACK_M = 0.0005
+# Of the last search: what happens between the samples of a cycle is left to the certificate. Corridors with
+# half a millimetre to spare are found with it; not at first, as more plans then have to be mended.
+LEAST_SLACK_M = 0.0001
 BEAM = BeamSettings()
 # what keeps hitting the posts of a narrow passage needs states told apart by millimetres
 FINE_BEAM = BeamSettings(width=40, cell_m=0.01, course_rad=0.05, slack_m=0.0002)
@@ -62,13 +66,18 @@ class LatticeSolver:
     ) -> None:
         self.problem, self.tell = problem, tell
         self.settings, self.beams = settings or LatticeSettings(), beams
+        if problem.goal.heading is not None:  # a map of places alone would lead past it
+            self.settings = replace(self.settings, by_heading=True)
+            self.beams = tuple(replace(beam, by_heading=True) for beam in beams)
         self.began, self.time_limit_s = time.perf_counter(), time_limit_s
-        self.judged = root is not None  # widths are judged on the whole way only
+        self.whole_way = root is None  # widths are judged on it only
+        self.judged = not self.whole_way
         self.begin = root or at_rest(problem)
         self.certifier = Certifier(problem, self.begin)
         self.counts = {"expanded": 0, "simulated": 0, "certificates": 0}
         self.kept: tuple[int, ...] = ()
         self.attempts, self.refined = 0, False
+        self.ended = False  # nothing is left to look at
         self.more_slack_m = 0.0
         self.search = self._search_from(self.begin)
 
@@ -86,8 +95,10 @@ class LatticeSolver:
                 return outcome
             if outcome is None:
                 if not self._retreat():
-                    reason = "no way at this resolution: everything reachable was looked at"
-                    return self._answer("infeasible", reason)
+                    self.ended = True
+                    if self.whole_way and no_body_fits(self.problem):
+                        return self._answer("infeasible", TOO_NARROW)
+                    return self._answer("not_found", self._exhausted())
                 continue
             gaits = self.kept + outcome
             certificate = self.certifier.certify(gaits)
@@ -95,21 +106,31 @@ class LatticeSolver:
             if certificate.passed:
                 return self._answer("solved", None, Plan("lattice", gaits, certificate))
             self._mend(gaits, certificate)
-        return self._answer("timeout", "plans were found but none passed the certificate")
+        return self._answer("not_found", "plans were found but none passed the certificate")
 
     def _look(self, last: int) -> tuple[int, ...] | PlanResult | None:
         """Return the gaits of a way, None when nothing is left to look at, or the answer when to stop."""
         while not self.search.exhausted:
             if self._too_narrow():
-                return self._answer("infeasible", TOO_NARROW)
+                self.ended = True
+                return self._answer("infeasible" if no_body_fits(self.problem) else "not_found", TOO_NARROW)
             way = self.search.advance(CHUNK)
             if way is not None:
                 return tuple(step.gait for step in way)
             if time.perf_counter() - self.began > self.time_limit_s:
                 return self._answer("timeout", f"no plan within the time limit of {self.time_limit_s:g} s")
             if self.looked_at > last:
-                return self._answer("timeout", f"no plan among the first {self.looked_at} cycles looked at")
+                return self._answer("not_found", f"no plan among the first {self.looked_at} cycles looked at")
         return None
+
+    def _exhausted(self) -> str:
+        """Say at what resolution nothing was found."""
+        s = self.settings
+        return (
+            f"nothing found at this resolution: states within {1e3 * s.cell_m:.0f} mm, "
+            f"{math.degrees(s.course_rad):.0f} deg and {s.speed_m_s:.2f} m/s of each other were taken for "
+            "one, so a way that only one of them has may have slipped through"
+        )
 
     def _too_narrow(self) -> bool:
         """Judge the widths, once, when the search does not come on."""
@@ -132,7 +153,12 @@ class LatticeSolver:
                 self.refined = True
                 s = self.settings
                 self.settings = replace(
-                    s, cell_m=s.cell_m / 2, course_rad=s.course_rad / 2, speed_m_s=s.speed_m_s / 2
+                    s,
+                    cell_m=s.cell_m / 2,
+                    course_rad=s.course_rad / 2,
+                    speed_m_s=s.speed_m_s / 2,
+                    slack_m=LEAST_SLACK_M,
+                    by_heading=True,
                 )
                 self.tell("nothing left at this resolution; looking again at half of it")
         self._begin_again((), self.begin)

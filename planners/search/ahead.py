@@ -14,7 +14,7 @@ MOST_GAIN = 5.0  # times the fastest gait's time for it, is the price of a way a
 OFF_THE_WAY_S = 1.0  # for a head in a place that leads nowhere
 
 
-def remaining(problem: Problem, end: Array, speed_m_s: Array) -> Array:
+def remaining(problem: Problem, end: Array, speed_m_s: Array, by_heading: bool = False) -> Array:
     """Return the estimated price of what is left from the ends of a cycle of every gait.
 
     Parameters
@@ -25,7 +25,28 @@ def remaining(problem: Problem, end: Array, speed_m_s: Array) -> Array:
         the head: it is the first to know that a cycle turns the right way.
     speed_m_s : array (gaits,)
         Forward speeds there: speed is dear, it takes seconds to gather.
+    by_heading : bool
+        Estimate by place, course and direction of travel (`heading_map`) instead of by place alone.
     """
+    if by_heading:
+        left, middle = _by_heading(problem, end)
+    else:
+        left, middle = _by_place(problem, end)
+    lack = np.clip(1 - np.abs(speed_m_s) / problem.tariff.top_speed_m_s, 0.0, 1.0)
+    left = left + problem.tariff.start_up * lack * np.minimum(left, 1.0)
+    return np.where(middle < BLOCKED_S, left, BLOCKED_S)
+
+
+def _by_heading(problem: Problem, end: Array) -> tuple[Array, Array]:
+    """Return the price of what is left, and whether there is a way at all (by place)."""
+    course = end[:, 2] + problem.motion.course[:-1]
+    middle = problem.to_goal.at(end[:, :2])
+    left = problem.to_goal_by_heading.at(end[:, :2], course, problem.motion.steady_speed_m_s < 0)
+    return np.where(left < BLOCKED_S, left, middle + OFF_THE_WAY_S), middle
+
+
+def _by_place(problem: Problem, end: Array) -> tuple[Array, Array]:
+    """Return the price of what is left, and whether there is a way at all."""
     course = end[:, 2] + problem.motion.course[:-1]
     lever = problem.robot.length_m / 2
     along = lever * np.stack([np.cos(course), np.sin(course)], axis=1)
@@ -36,10 +57,7 @@ def remaining(problem: Problem, end: Array, speed_m_s: Array) -> Array:
     # what is nearer to the goal by more than the way there takes lies behind a wall
     gain = MOST_GAIN * lever / problem.tariff.top_speed_m_s
     head, front = np.maximum(head, middle - gain), np.maximum(front, middle - 0.5 * gain)
-    left = (middle + 2 * head + front) / 4
-    lack = np.clip(1 - np.abs(speed_m_s) / problem.tariff.top_speed_m_s, 0.0, 1.0)
-    left = left + problem.tariff.start_up * lack * np.minimum(left, 1.0)
-    return np.where(middle < BLOCKED_S, left, BLOCKED_S)
+    return (middle + 2 * head + front) / 4, middle
 
 
 def motion_lines(problem: Problem, before: int, pose: Array, gaits: NDArray[np.int64] | slice) -> Array:

@@ -43,6 +43,8 @@ class BeamSettings:
         Price of a cycle that just keeps the margin (none where a body width of air is left).
     slack_m : float
         Beyond the margin, for what happens between the samples of a cycle.
+    by_heading : bool
+        Estimate what is left by place, course and direction of travel.
     """
 
     width: int | None = None
@@ -53,6 +55,7 @@ class BeamSettings:
     change_s: float = 0.02
     air_s: float = 0.07
     slack_m: float = 0.0005
+    by_heading: bool = False
 
 
 class _Offer(NamedTuple):
@@ -121,7 +124,7 @@ class BeamSearch:
         problem, s, motion = self.problem, self.settings, self.problem.motion
         state, before = self._tree.cycle[node].state, self._tree.gait[node]
         move = motion.move(state[0], state[1], state[2], before, state[3])
-        left = remaining(problem, move.pose[:, -1], move.speed_m_s)
+        left = remaining(problem, move.pose[:, -1], move.speed_m_s, s.by_heading)
         order = np.argsort(left + motion.period_s, kind="stable")
         order = order[(left[order] < BLOCKED_S / 2) & problem.motion.allowed[before, order]]
         offers: list[_Offer] = []

@@ -95,7 +95,7 @@ def cost_map(
     nodes = np.stack(np.meshgrid(x, y), axis=-1)
     room = field.clearance(nodes)
     reach, speed = speed_by_room(table)
-    slowness = per_metre(_slowness(room, reach, speed), room)
+    per_node = per_metre(slowness(room, reach, speed), room)
     free = room > blocked
     index = np.arange(rows * columns).reshape(rows, columns)
     starts, ends, costs = [], [], []
@@ -108,7 +108,7 @@ def cost_map(
             ok[ok] = field.clearance(between) > blocked
         starts.append(index[a][ok])
         ends.append(index[b][ok])
-        costs.append(math.hypot(di, dj) * spacing * (slowness[a][ok] + slowness[b][ok]) / 2)
+        costs.append(math.hypot(di, dj) * spacing * (per_node[a][ok] + per_node[b][ok]) / 2)
     away = goal.distance(nodes).ravel()
     sources = np.flatnonzero((away <= 0) & free.ravel())
     if not sources.size:  # a goal smaller than the grid
@@ -122,7 +122,7 @@ def cost_map(
     return CostMap(seconds, (float(x[0]), float(y[0])), spacing)
 
 
-def _slowness(room: Array, reach: Array, speed: Array) -> Array:
+def slowness(room: Array, reach: Array, speed: Array) -> Array:
     """Return seconds per metre: the fastest gait that fits, and a little less where it just fits."""
     fitting = np.searchsorted(reach, room, side="right") - 1
     best = np.where(fitting >= 0, speed[np.maximum(fitting, 0)], 0.25 * speed[0])

@@ -39,6 +39,8 @@ class LatticeSettings:
         Price of a cycle that just keeps the margin (none where a body width of air is left).
     slack_m : float
         Beyond the margin, for what happens between the samples of a cycle.
+    by_heading : bool
+        Estimate what is left by place, course and direction of travel.
     """
 
     cell_m: float = 0.02
@@ -50,6 +52,7 @@ class LatticeSettings:
     change_s: float = 0.05
     air_s: float = 0.3
     slack_m: float = 0.0005
+    by_heading: bool = False
 
 
 class LatticeSearch:
@@ -131,7 +134,7 @@ class LatticeSearch:
         # every other point and sample decides what is out of the question; the simulation decides the rest
         lines = motion_lines(problem, before, move.pose, self._gaits)
         room = problem.body.estimate(lines).min(axis=1)
-        left = remaining(problem, move.pose[:, -1], move.speed_m_s)
+        left = remaining(problem, move.pose[:, -1], move.speed_m_s, s.by_heading)
         possible = (room > problem.margin_m - problem.field.error_m) & (left < BLOCKED_S / 2)
         possible &= problem.motion.allowed[before]
         air = np.clip(1 - (room - problem.margin_m) / problem.motion.body_width_m, 0.0, 1.0)

@@ -18,7 +18,8 @@ from planners.motion.robots import undelayed
 from planners.motion.table import MotionTable, body_in_room
 from planners.motion.valves import Joints
 from planners.search.clearance import BodyClearance
-from planners.search.costmap import CostMap, cost_map
+from planners.search.costmap import CostMap, cost_map, slowness, speed_by_room
+from planners.search.heading_map import HeadingMap, heading_map
 from planners.search.price import Price, Tariff
 from srs_opt.drive.calibration import NO_CALIBRATION, DriveCalibration
 from srs_opt.errors import NoAnswerError
@@ -31,6 +32,8 @@ from srs_opt.simulate.together import together
 
 Array = NDArray[np.float64]
 ROUNDING_M = 1e-6
+# Of the shortest way, and body lengths more: longer detours are not looked at.
+DETOUR_TIMES, DETOUR_LENGTHS = 1.5, 16.0
 STEP_S = 0.002  # errs by about 0.04 mrad per cycle
 
 
@@ -110,12 +113,36 @@ class Problem:
     @cached_property
     def to_goal(self) -> CostMap:
         """Price of the way to the goal (time, where time counts)."""
-        half = self.robot.body_width_m / 2
+        return cost_map(self.field, self.goal, self.gaits, self.robot.body_width_m / 2, self._per_metre)
 
-        def per_metre(in_time: Array, room: Array) -> Array:
-            return self.tariff.per_metre(in_time, room - half - self.margin_m)
+    def _per_metre(self, in_time: Array, room: Array) -> Array:
+        return self.tariff.per_metre(in_time, room - self.robot.body_width_m / 2 - self.margin_m)
 
-        return cost_map(self.field, self.goal, self.gaits, half, per_metre)
+    @cached_property
+    def to_goal_by_heading(self) -> HeadingMap:
+        """Price of the way to the goal by place, course and direction of travel."""
+        half, start = self.robot.body_width_m / 2, self.start
+        radius = 0.1 * self.robot.length_m
+        from_start = cost_map(self.field, Goal(start.x, start.y, radius), self.gaits, half, self._per_metre)
+        least = float(self.to_goal.at(np.array([start.x, start.y])))
+        detour = DETOUR_LENGTHS * self.robot.length_m / self.tariff.top_speed_m_s
+
+        def near_the_way(nodes: Array) -> NDArray[np.bool_]:
+            price = self.to_goal.at(nodes) + from_start.at(nodes)
+            return price < DETOUR_TIMES * least + detour
+
+        def price_per_metre(room: Array) -> Array:
+            return self._per_metre(slowness(room, *speed_by_room(self.gaits)), room)
+
+        return heading_map(
+            self.field,
+            self.goal,
+            self.gaits,
+            half + self.margin_m,
+            price_per_metre,
+            self.tariff.start_up,
+            near_the_way,
+        )
 
     @cached_property
     def tariff(self) -> Tariff:

@@ -77,6 +77,8 @@ def _summary(found: Calibration) -> str:
         lines.append("from maps alone; 8 s of track of every gait would know better by the factor")
         less = {n: sd / found.sd_with_tracks[n] for n, sd in found.sd.items()}
         lines.append(", ".join(f"{name} {factor:.2g}" for name, factor in less.items()))
+    if found.robot.friction_normal < found.robot.friction_tangential:
+        lines.append("friction across is below friction along: not so with wheels; are head and tail right?")
     if found.after > 1.1:
         lines.append("the model does not explain the data: see python -m srs_opt.discrepancy")
     return "\n".join(lines)

@@ -37,6 +37,7 @@ OPTIONAL = (
     "replicate_of",
     "kind",
 )
+MOST_BENT_RAD = 0.15  # between neighbouring chords at the start; wheels stick, so a few degrees stay at rest
 SAME_RATE = 1e-3  # rates found from rounded times differ by less
 SCALES = ((1.0, "metres"), (1e-3, "millimetres"), (1e-2, "centimetres"), (0.0254, "inches"))
 
@@ -218,6 +219,7 @@ def import_trial(
             "calibrate and discrepancy take the robot for straight and at rest when they start"
         )
     trial = _cut(source, row, tracks, start, report, schedule)
+    _check_rest(trial, warnings)
     _check_turn(trial, warnings)
     ghosts = seen - int((owners >= 0).sum())
     note = TrialNote(trial.name, source.name, start, start_sd, trial.lost_fraction, ghosts, tuple(warnings))
@@ -337,6 +339,21 @@ def _cut(
         replicate_of=row.text("replicate_of") or None,
         kind=row.text("kind") or "gait",
     )
+
+
+def _check_rest(trial: Trial, warnings: list[str]) -> None:
+    """The fits take a robot for straight and at rest when its valves start."""
+    points = trial.markers_m
+    if points is None or trial.kind != "gait":
+        return
+    chords = np.diff(points[:3], axis=1)
+    angle = np.arctan2(chords[..., 1], chords[..., 0])
+    bends = np.abs(np.mod(np.diff(angle, axis=1) + np.pi, 2 * np.pi) - np.pi)
+    if np.isfinite(bends).any() and float(np.nanmax(bends)) > MOST_BENT_RAD:
+        warnings.append(
+            f"the robot is bent by {np.nanmax(bends):.2g} rad at the valves' start: the fits "
+            "take it for straight and at rest then (a take that begins in mid-gait does not fit)"
+        )
 
 
 def _check_turn(trial: Trial, warnings: list[str]) -> None:

@@ -32,6 +32,13 @@ def check_robot(robot: Robot, file: str, report: Report) -> None:
         report.error(file, None, f"{message} is denser than lead: in grams?")
     elif density < 0.5:
         report.error(file, None, f"{message} is lighter than air: lengths not in metres?")
+    if robot.friction_normal < robot.friction_tangential:
+        report.warn(
+            file,
+            None,
+            f"friction_normal {robot.friction_normal:g} is below friction_tangential "
+            f"{robot.friction_tangential:g}: this body has no wheels, and goes along its wave",
+        )
     if robot.tau1_s > 20 or robot.tau2_s > 20:
         report.error(file, None, f"tau1_s, tau2_s: {robot.tau1_s:g}, {robot.tau2_s:g} s: in milliseconds?")
 

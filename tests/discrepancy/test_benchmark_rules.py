@@ -24,7 +24,9 @@ def test_an_exact_tie_counts_when_both_are_said():
 
 
 def test_look_alikes_are_the_right_class():
-    assert right_class(row(["segment_bias"], "named", ["single_wheel_toe"]))
+    alike = {"alike": [{"effects": ["single_wheel_toe", "segment_bias"], "angle_rad": 0.05}]}
+    assert right_class({**row(["segment_bias"], "named", ["single_wheel_toe"]), **alike})
+    assert not right_class(row(["segment_bias"], "named", ["single_wheel_toe"]))
     assert not right_class(row(["segment_bias"], "named", ["head_mass"]))
     assert not right_class(row(["segment_bias"], "unknown"))
 

@@ -166,6 +166,26 @@ def test_more_markers_than_links_are_not_ghosts(tmp_path, capsys):
     assert "positions, the robot has 5 links" in capsys.readouterr().err
 
 
+def test_a_take_in_mid_gait_is_told(tmp_path, capsys):
+    late = f"m1,1.5,48,0.4,1.570796,{START + 1.3}"
+    for row, told in ((ROW, False), (late, True)):
+        folder = tmp_path / str(told)
+        folder.mkdir()
+        (folder / "m1.csv").write_text(motive_text())
+        (folder / "list.csv").write_text(f"{COLUMNS},valve_start_s\n{row}\n")
+        argv = [
+            str(folder / "m1.csv"),
+            "--trials",
+            str(folder / "list.csv"),
+            "--out",
+            str(folder / "o"),
+            "--json",
+        ]
+        assert run_command(build_parser(), run, argv) == 0
+        said = json.loads(capsys.readouterr().out)["trials"][0]["warnings"]
+        assert any("mid-gait" in word for word in said) == told
+
+
 def test_schedules_come_along(tmp_path):
     (tmp_path / "s.csv").write_text(
         "segment, on_s, off_s, period_s\n" + "".join(f"{i}, 0.1, 0.3, 0.5\n" for i in (1, 2, 3, 4))

@@ -17,7 +17,7 @@ def _groups():
     """Effects by kind, actuators with and without a closed form apart: each group is compiled once."""
     groups = {}
     for name, effect in all_effects().items():
-        if effect.kind != "measurement":
+        if effect.in_equations or effect.delay is not None:
             kind = "nonlinear actuators" if effect.nonlinear_actuator else effect.kind
             groups.setdefault(kind, []).append(name)
     return groups

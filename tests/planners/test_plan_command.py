@@ -76,6 +76,12 @@ def test_costs_get_what_they_ask_for(capsys, tmp_path):
     assert answers["air"]["air_j"] < 0.9 * fast["air_j"]
 
 
+def test_planners_are_named_in_any_case():
+    from planners.plan.__main__ import build_parser
+
+    assert build_parser().parse_args(["maze.yaml", "--planner", "EST"]).planner == "est"
+
+
 def test_costs_of_the_command_are_those_of_the_search():
     from planners.plan.__main__ import COSTS
     from planners.search.price import PRICES
