@@ -12,7 +12,7 @@ from blocks import Block, blocks, commands, same_line, same_output
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = sorted([ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").rglob("*.md")])
-SHOWN_ONLY = {"", "text", "csv", "json", "c", "mermaid", "yaml", "html", "make"}
+SHOWN_ONLY = {"", "text", "toml", "csv", "json", "c", "mermaid", "yaml", "html", "make"}
 SLOW_PAGES = {"README.md", "tutorial.md", "measure.md", "commands.md", "maze.md"}
 
 
