@@ -11,7 +11,7 @@ ROOT = Path(__file__).resolve().parents[2]
 NOT_COMMANDS = {"planners.tour"}
 
 RUN = {
-    "name": "planned", "duration_s": 1, "cycles": [[0, 0]], "centre": [[0, 0], [1, 0]],
+    "name": "planned", "duration_s": 1, "cycles": [[0, 0, None]], "centre": [[0, 0], [1, 0]],
     "body": [[0, 0, 1, 0], [1, 0, 2, 0]], "clearance_mm": [50, 50],
 }  # fmt: skip
 MOTION = {
@@ -51,7 +51,7 @@ FILES = {
     "trials.csv": "trial,frequency_hz\na,1\n",
     "empty.yaml": "",
     "no_gaits/motion.json": json.dumps(MOTION | {"gaits": []}),
-    "cycle/motion.json": json.dumps(MOTION | {"runs": [RUN | {"cycles": [[7, 0]]}]}),
+    "cycle/motion.json": json.dumps(MOTION | {"runs": [RUN | {"cycles": [[7, 0, None]]}]}),
     "still/motion.json": json.dumps(MOTION | {"runs": [RUN | {"cycles": []}]}),
     "short/motion.json": json.dumps(MOTION | {"runs": [RUN | {"clearance_mm": [1, 2, 3]}]}),
 }
