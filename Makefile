@@ -4,7 +4,7 @@ VENV   := .venv
 PY     := $(VENV)/bin/python
 STAMP  := $(VENV)/.installed
 
-.PHONY: venv run test lint bench docs pictures clean
+.PHONY: venv run pilot test lint bench docs pictures clean
 
 venv: $(STAMP)
 
@@ -15,6 +15,18 @@ $(STAMP): pyproject.toml constraints.txt
 
 run: venv
 	$(PY) -m planners.tour --out out
+
+# The whole chain on this machine: plan, pilot, serial line, C firmware, virtual snake, data set.
+pilot: venv
+	mkdir -p out/pilot
+	$(PY) -c "from srs_opt.gait_opt.catalogue import default_table; from srs_opt.robot import wpi_srs; \
+	from srs_opt.controller.program import Program; from srs_opt.controller.c_source import write_program; \
+	from pathlib import Path; \
+	write_program(Program.of_table(default_table(wpi_srs()), 1e-3), Path('out/pilot/gait_table.h'))"
+	$(PY) -m virtual_lab.robot --program out/pilot/gait_table.h --start 0.2,1.024,0 --link out/pilot/valves \
+	  --effect tether_drag --duration 90 & \
+	sleep 5; $(PY) -m planners.pilot mazes/first.yaml --valves out/pilot/valves --pose udp://127.0.0.1:5005 \
+	  --out out/pilot; status=$$?; kill %1 2>/dev/null; wait; exit $$status
 
 lint: venv
 	$(VENV)/bin/ruff check .

@@ -183,6 +183,22 @@ srs_fault srs_player_run(srs_player *p) {
   return accept(p, &cycle, 0u);
 }
 
+uint16_t srs_nearest(const srs_program *program, int16_t speed_mm_s, int16_t turn_rate_mrad_s) {
+  uint16_t best = SRS_NONE;
+  int64_t least = 250001; /* (50 mm/s)^2 in units of 0.1 mm/s, and one: within 50 is near */
+  for (uint16_t k = 0; (k < program->gait_count) && ((speed_mm_s != 0) || (turn_rate_mrad_s != 0)); ++k) {
+    srs_gait gait;
+    srs_read(&gait, &program->gaits[k], (uint16_t)sizeof gait);
+    const int64_t v = 10 * ((int64_t)gait.speed_mm_s - speed_mm_s);
+    const int64_t w = (int64_t)gait.turn_rate_mrad_s - turn_rate_mrad_s; /* mrad/s on 0.1 m: 0.1 mm/s */
+    if (v * v + w * w < least) {
+      least = v * v + w * w;
+      best = k;
+    }
+  }
+  return best;
+}
+
 void srs_player_vent(srs_player *p) {
   p->has_pending = 0u;
   p->step = SRS_NONE;

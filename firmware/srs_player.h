@@ -135,6 +135,10 @@ void srs_player_vent(srs_player *p);
 /* One tick of the timer. */
 void srs_player_tick(srs_player *p);
 
+/* The gait nearest to a wanted motion, 1 rad/s counting as 0.1 m/s; SRS_NONE, which is to vent, for standing
+ * still and where no gait is within 50 mm/s. */
+uint16_t srs_nearest(const srs_program *program, int16_t speed_mm_s, int16_t turn_rate_mrad_s);
+
 /* State of one segment (from 0, the tail): 1 left, -1 right, 0 vented. */
 int8_t srs_valve(const uint32_t *valves, uint8_t segment);
 

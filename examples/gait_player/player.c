@@ -1,47 +1,20 @@
-/* Plays a gait table as a microcontroller would: one call per tick, valves written only when they change.
+/* Plays a gait table on the firmware's player library as a microcontroller would: one call per tick.
  *
- *   cc -std=c99 -Wall -Werror -I FOLDER player.c -o player     (FOLDER holds gait_table.h)
- *   ./player SPEED_MM_S TURN_RATE_MRAD_S TICKS                  prints the valves at every tick
+ *   cc -std=c99 -I FOLDER -I firmware player.c firmware/srs_player.c -o player   (FOLDER holds gait_table.h)
+ *   ./player SPEED_MM_S TURN_RATE_MRAD_S TICKS      prints the valves at every tick, from the first cycle on
  *
- * On a real controller, write_valves() sets output pins and the loop body is the timer's interrupt. */
+ * On a real controller the loop body is the timer's interrupt, and srs_write_pins() sets output pins. */
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "gait_table.h"
 
-typedef struct {
-  const srs_gait *gait; /* null: vented */
-  uint32_t tick;        /* since the gait's cycle began */
-  uint32_t valves[SRS_WORDS];
-} player;
-
-static void start(player *p, const srs_gait *gait) {
-  p->gait = gait;
-  p->tick = 0;
-}
-
-static void stop(player *p) { start(p, NULL); }
-
-/* Both valves of one segment open would short the supply to the air: refuse whatever the table says. */
-static int safe(const uint32_t *valves) {
-  for (uint32_t w = 0; w < SRS_WORDS; ++w)
-    if (valves[w] & (valves[w] >> 1) & 0x55555555u) return 0;
-  return 1;
-}
-
-static void write_valves(const uint32_t *valves) {
-  for (uint32_t s = 0; s < SRS_SEGMENTS; ++s) {
-    uint32_t bits = (valves[2 * s / 32] >> (2 * s % 32)) & 3u;
-    putchar(bits == 1u ? 'L' : bits == 2u ? 'R' : '-');
+static void print_valves(const srs_player *p) {
+  for (uint8_t s = 0; s < p->program->segments; ++s) {
+    const int8_t state = srs_valve(p->valves, s);
+    putchar(state == 1 ? 'L' : state == -1 ? 'R' : '-');
   }
   putchar('\n');
-}
-
-static void step(player *p) {
-  const uint32_t *wanted = srs_valves(p->gait, p->tick);
-  memcpy(p->valves, safe(wanted) ? wanted : srs_vent, sizeof p->valves);
-  p->tick = p->gait ? (p->tick + 1) % p->gait->period_ticks : 0;
 }
 
 int main(int count, char **word) {
@@ -49,15 +22,24 @@ int main(int count, char **word) {
     fprintf(stderr, "usage: %s SPEED_MM_S TURN_RATE_MRAD_S TICKS\n", word[0]);
     return 2;
   }
-  player p = {0};
-  start(&p, srs_nearest(atoi(word[1]), atoi(word[2])));
-  fprintf(stderr, "%s\n", p.gait ? p.gait->name : "vented");
-  for (long tick = 0; tick < atol(word[3]); ++tick) {
-    step(&p);
-    write_valves(p.valves);
+  static srs_player player;
+  if (srs_player_init(&player, &srs_program_data) != SRS_OK) { return 1; }
+  const uint16_t gait = srs_nearest(&srs_program_data, (int16_t)atoi(word[1]), (int16_t)atoi(word[2]));
+  if (gait == SRS_NONE) {
+    fprintf(stderr, "vented: no gait is near\n");
+  } else {
+    fprintf(stderr, "gait %u\n", (unsigned)gait);
+    (void)srs_player_select(&player, gait, gait);
+    while (player.state != SRS_PLAYING) { srs_player_tick(&player); } /* the regulator settles */
+    print_valves(&player);
   }
-  stop(&p);
-  step(&p); /* vent at the end */
-  write_valves(p.valves);
+  for (long tick = gait == SRS_NONE ? 0 : 1; tick < atol(word[3]); ++tick) {
+    player.silent = 0; /* a pilot's word; without it the controller vents after its timeout */
+    srs_player_tick(&player);
+    print_valves(&player);
+  }
+  srs_player_vent(&player);
+  srs_player_tick(&player);
+  print_valves(&player);
   return 0;
 }

@@ -132,6 +132,10 @@ class PilotedPlant:
         """S of every segment now, as ordered."""
         return self._log.states_at(self._clock.now(), self.robot.segments)
 
+    def expect_decisions(self, seconds: float) -> None:
+        """Say how long the driver will take between two cycles, until it is seen."""
+        self._thinking_s = seconds
+
     def stop_now(self, reason: str) -> None:
         """Vent and end the drive; raises `PlantStopped`."""
         self._stop(reason, may_go_on=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -20,6 +21,7 @@ from planners.search.problem import Problem
 from srs_opt.controller.program import Program
 from srs_opt.errors import InputError, NoAnswerError
 
+LONGEST_DECISION_S = 0.1  # that the first cycle is prepared for; later ones by what was seen
 AT_START_M, AT_START_RAD = 0.03, 0.15  # farther from the maze's start, and nothing is begun
 
 
@@ -104,12 +106,16 @@ def pilot(
     """
     line = connect(port, clock, program)
     # a rehearsal on the model: it also loads all code, so that the first real decision is not late
+    begun_s = time.perf_counter()
     rehearsal = execute(problem, plan)
+    decision_s = 2 * (time.perf_counter() - begun_s) / max(len(rehearsal.gaits), 1)
     if not rehearsal.reached:
         raise NoAnswerError(f"the drive fails on the model already: {rehearsal.reason}")
     log = DriveLog()
     plant = PilotedPlant(problem, program, line, Camera(source), clock, log, tell, watch)
+    plant.expect_decisions(min(decision_s, LONGEST_DECISION_S))
     _check_start(problem, plant.state)
+    tell("driving")
     try:
         execution = Drive(problem, plan, plant, tell).go()
     finally:

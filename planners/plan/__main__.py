@@ -179,14 +179,17 @@ def _drive(
 def _pictures(
     options: argparse.Namespace, problem: Problem, result: PlanResult, execution: Execution | None
 ) -> list[Path]:
+    from planners.plan.program import plan_program
     from planners.view.animate import save_animation
     from planners.view.picture import save_plan_picture
     from planners.view.record import save_motion
+    from srs_opt.controller.c_source import write_program
 
     assert result.plan is not None  # the caller has looked
     driven = None if execution is None else execution.pose[:, :2]
     files = [*save_plan_picture(options.out / "plan", problem, result.plan, driven)]
     files.append(save_motion(options.out / "motion.json", problem, result.plan, execution))
+    files.append(write_program(plan_program(problem, result.plan), options.out / "plan_program.h"))
     if options.animate:
         files.append(save_animation(options.animate, problem, result.plan, execution))
     return files

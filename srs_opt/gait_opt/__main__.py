@@ -175,8 +175,10 @@ def _run_table(options: argparse.Namespace) -> Answer:
     import shutil
     import time
 
+    from srs_opt.controller.c_source import write_program
+    from srs_opt.controller.program import Program
     from srs_opt.gait_opt.catalogue import cached_table_path
-    from srs_opt.gait_opt.export import write_csv, write_header
+    from srs_opt.gait_opt.export import write_csv
     from srs_opt.gait_opt.family import TABLE_PRESSURE_KPA, build_table
     from srs_opt.gait_opt.figures import draw_pareto
     from srs_opt.gait_opt.goal import Limits
@@ -201,7 +203,7 @@ def _run_table(options: argparse.Namespace) -> Answer:
     files = [
         save_table(table, options.out / "gait_table.json"),
         write_csv(table, options.out / "gait_table.csv"),
-        write_header(table, options.out / "gait_table.h", options.tick),
+        write_program(Program.of_table(table, options.tick), options.out / "gait_table.h"),
         *draw_pareto(table, options.out / "pareto"),
     ]
     if limits == Limits(pressure_kpa=TABLE_PRESSURE_KPA):  # then `plan` may take it without being told

@@ -17,6 +17,8 @@ from srs_opt.orbit.steady import Orbit
 from srs_opt.robot import Robot
 
 VERSION = 1
+# Half the step between the table's speeds; half of it refuses what is nearly there, double plays what is not.
+NEAR_M_S = 0.05
 
 
 @dataclass(frozen=True)
@@ -108,11 +110,24 @@ class GaitTable:
                 return gait
         raise KeyError(name)
 
-    def nearest(self, speed_m_s: float, turn_rate_rad_s: float, lever_m: float = 0.1) -> TableGait:
-        """Return the gait nearest to a wanted motion; turn rates weigh `lever_m` against speeds."""
+    def nearest(
+        self,
+        speed_m_s: float,
+        turn_rate_rad_s: float,
+        lever_m: float = 0.1,
+        tolerance_m_s: float = NEAR_M_S,
+    ) -> TableGait | None:
+        """Return the gait nearest to a wanted motion; turn rates weigh `lever_m` against speeds.
+
+        None, which is to vent, for standing still and where no gait is within `tolerance_m_s`: a robot that
+        is asked to turn on the spot must not shoot ahead. `srs_nearest` of the firmware answers the same.
+        """
+        if speed_m_s == 0 and turn_rate_rad_s == 0:
+            return None
         motion = np.array([[g.speed_m_s, lever_m * g.turn_rate_rad_s] for g in self.gaits])
         distance = np.hypot(*(motion - [speed_m_s, lever_m * turn_rate_rad_s]).T)
-        return self.gaits[int(distance.argmin())]
+        best = int(distance.argmin())
+        return self.gaits[best] if distance[best] <= tolerance_m_s else None
 
 
 def save_table(table: GaitTable, path: Path | str) -> Path:

@@ -12,7 +12,7 @@ from blocks import Block, blocks, commands, same_line, same_output
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = sorted([ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").rglob("*.md")])
-SHOWN_ONLY = {"", "text", "csv", "json", "c", "mermaid", "yaml", "html", "make"}
+SHOWN_ONLY = {"", "text", "toml", "csv", "json", "c", "mermaid", "yaml", "html", "make"}
 SLOW_PAGES = {"README.md", "tutorial.md", "measure.md", "commands.md", "maze.md"}
 
 
@@ -29,7 +29,7 @@ class Tolerant(doctest.OutputChecker):
 @pytest.fixture
 def desk(tmp_path, monkeypatch) -> Path:
     """A folder to work in that looks like the project's to the commands."""
-    for name in ("mazes", "examples", "virtual_lab", "docs"):
+    for name in ("mazes", "examples", "virtual_lab", "docs", "firmware"):
         (tmp_path / name).symlink_to(ROOT / name)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("PATH", f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")

@@ -11,18 +11,23 @@ import pytest
 
 from benchmarks.pilot import contest, drive_contest, virtual_pilot
 from planners.drive.plant import PlantStopped
+from planners.pilot import protocol
 from planners.pilot.observer import Latency, correct, straight_pose
 from planners.pilot.page import LivePage
 from planners.pilot.plant import PilotedPlant
 from planners.pilot.pose import Camera, Report, Sighting, parse_report
+from planners.pilot.protocol import Command, Fault
 from planners.pilot.record import DriveLog
 from planners.pilot.session import connect, pilot
+from planners.plan.program import plan_program
+from srs_opt.controller.c_source import write_program
 from srs_opt.controller.program import Program
 from srs_opt.errors import InputError
 from srs_opt.measurement.chain import chain_of, link_positions
 from srs_opt.orbit.steady import integrator
 from srs_opt.robot import wpi_srs
 from srs_opt.simulate.timeline import Timeline
+from virtual_lab.controller import Controller
 from virtual_lab.truth import Truth
 
 pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
@@ -46,6 +51,21 @@ def test_contest_mazes_are_driven_through_firmware_and_line_without_contact(seed
 def test_a_robot_with_a_hose_arrives_or_stops_but_does_not_touch():
     row = drive_contest(1, 0.36, Truth(effects=({"name": "tether_drag", "force_n": 0.035},)))
     assert row["true_clearance_m"] > 0
+
+
+def test_a_plan_runs_by_itself_as_it_was_planned(arena, tmp_path):
+    program = plan_program(arena.problem, arena.plan)
+    controller = Controller(write_program(program, tmp_path / "plan_program.h"))
+    controller.receive(protocol.frame(Command.RUN, 1))
+    before = (arena.problem.motion.rest, *arena.plan.gaits)
+    cycles = [arena.problem.joints.timeline(a, b) for a, b in zip(before, arena.plan.gaits)]
+    wanted = Timeline.join(cycles)
+    ends = np.cumsum(wanted.duration_s)
+    played = np.array([controller.tick()[0] for _ in range(300 + round(ends[-1] / 1e-3))])[300:]
+    at = np.searchsorted(ends, (np.arange(len(played)) + 0.5) * 1e-3)
+    np.testing.assert_array_equal(played, wanted.valve[:, at].T)
+    assert controller.fault == Fault.OK  # the dwell guard had nothing to do
+    assert not controller.tick()[0].any()
 
 
 def test_a_lost_pose_vents_before_anything_is_touched(arena):

@@ -9,11 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from srs_opt.controller.c_source import c_source, write_program
+from srs_opt.controller.program import ControllerLimits, Program
 from srs_opt.errors import InputError
 from srs_opt.gait import Wave
 from srs_opt.gait_opt import family
 from srs_opt.gait_opt.catalogue import default_table, shipped_table
-from srs_opt.gait_opt.export import c_header, write_csv, write_header
+from srs_opt.gait_opt.export import write_csv
 from srs_opt.gait_opt.family import build_table
 from srs_opt.gait_opt.ladder import Rung
 from srs_opt.gait_opt.table import GaitTable, load_table, save_table
@@ -24,6 +26,7 @@ from srs_opt.robot import wpi_srs
 
 ROBOT = wpi_srs()
 TICK_S = 0.001
+FIRMWARE = Path(__file__).resolve().parents[2] / "firmware"
 PLAYER = Path(__file__).resolve().parents[2] / "examples" / "gait_player" / "player.c"
 
 
@@ -130,10 +133,13 @@ def test_schedule_refuses_times_between_ticks(table):
 
 @pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
 def test_player_in_c_plays_every_tick(table, tmp_path):
-    write_header(table, tmp_path / "gait_table.h", TICK_S)
+    # a cycle may begin in the middle of a pulse: without the dwell guard every tick is as the table says
+    written = Program.of_table(table, TICK_S, ControllerLimits(dwell_s=0.0))
+    write_program(written, tmp_path / "gait_table.h")
     program = tmp_path / "player"
-    flags = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-I", str(tmp_path)]
-    subprocess.run(["cc", *flags, str(PLAYER), "-o", str(program)], check=True)
+    flags = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-I", str(tmp_path), "-I", str(FIRMWARE)]
+    sources = [str(PLAYER), str(FIRMWARE / "srs_player.c")]
+    subprocess.run(["cc", *flags, *sources, "-o", str(program)], check=True)
     for entry in table.gaits[::9]:
         speed, turn = round(1e3 * entry.speed_m_s), round(1e3 * entry.turn_rate_rad_s)
         schedule = Schedule.of_gait(entry.gait, TICK_S)
@@ -141,7 +147,8 @@ def test_player_in_c_plays_every_tick(table, tmp_path):
         done = subprocess.run(
             [str(program), str(speed), str(turn), str(ticks)], capture_output=True, text=True, check=True
         )
-        played = table[done.stderr.strip()]
+        played = table.gaits[int(done.stderr.split()[1])]
+        assert played is table.nearest(1e-3 * speed, 1e-3 * turn)
         assert (played.speed_m_s, played.turn_rate_rad_s) == pytest.approx(
             (entry.speed_m_s, entry.turn_rate_rad_s), abs=0.02
         )
@@ -153,10 +160,14 @@ def test_player_in_c_plays_every_tick(table, tmp_path):
             for t in range(ticks)
         ]
         assert lines[:-1] == expected
+    for speed, turn in ((0, 0), (0, 6000), (20, 0), (9999, 0)):
+        done = subprocess.run([str(program), str(speed), str(turn), "30"], capture_output=True, text=True)
+        assert "no gait is near" in done.stderr and set(done.stdout.split()) == {"----"}
+        assert table.nearest(1e-3 * speed, 1e-3 * turn) is None
 
 
 def test_header_never_opens_both_valves(table):
-    text = c_header(table, TICK_S)
+    text = c_source(Program.of_table(table, TICK_S))
     masks = [int(word, 16) for word in re.findall(r"\{(0x[0-9a-f]+)u\}", text)]
     assert masks
     assert all(mask & (mask >> 1) & 0x55555555 == 0 for mask in masks)

@@ -11,11 +11,12 @@ ROOT = Path(__file__).resolve().parents[2]
 NOT_COMMANDS = {"planners.tour"}
 
 RUN = {
-    "name": "planned", "duration_s": 1, "cycles": [[0, 0]], "centre": [[0, 0], [1, 0]],
+    "name": "planned", "duration_s": 1, "cycles": [[0, 0, None]], "centre": [[0, 0], [1, 0]],
     "body": [[0, 0, 1, 0], [1, 0, 2, 0]], "clearance_mm": [50, 50],
 }  # fmt: skip
 MOTION = {
-    "version": 1, "robot": "x", "body_width_m": 0.04, "margin_m": 0.005, "runs": [RUN],
+    "version": 2, "robot": "x", "body_width_m": 0.04, "margin_m": 0.005, "runs": [RUN], "joining": [],
+    "valves": {"min_dwell_s": 0.02, "tick_s": 0.001, "pressure_rate_kpa_s": None},
     "maze": {"name": "x", "bounds": [0, 0, 1, 1], "rings": [], "cells": None, "start": None, "goal": None},
     "gaits": [{"name": "x", "period_s": 1, "pressure_kpa": 50, "intervals": [[[0, 0.5]]]}],
 }  # fmt: skip
@@ -50,7 +51,7 @@ FILES = {
     "trials.csv": "trial,frequency_hz\na,1\n",
     "empty.yaml": "",
     "no_gaits/motion.json": json.dumps(MOTION | {"gaits": []}),
-    "cycle/motion.json": json.dumps(MOTION | {"runs": [RUN | {"cycles": [[7, 0]]}]}),
+    "cycle/motion.json": json.dumps(MOTION | {"runs": [RUN | {"cycles": [[7, 0, None]]}]}),
     "still/motion.json": json.dumps(MOTION | {"runs": [RUN | {"cycles": []}]}),
     "short/motion.json": json.dumps(MOTION | {"runs": [RUN | {"clearance_mm": [1, 2, 3]}]}),
 }
@@ -138,6 +139,8 @@ CASES = [
     ("planners.generate", ["--cell", "1e-300"], 2, "expected 0.001 to 100 m"),
     ("planners.generate", ["--cell", "1e308"], 2, "expected 0.001 to 100 m"),
     ("planners.generate", ["--style", "corridor", "--length", "1e9"], 2, "--length"),
+    ("planners.pilot", ["mazes/first.yaml"], 2, "--valves"),
+    ("planners.pilot", ["mazes/first.yaml", "--valves", "{tmp}/absent", "--pose", "udp://:1"], 2, "opened"),
     ("planners.view", ["{tmp}/absent"], 2, "no such file"),
     ("planners.view", ["{tmp}/walls.yaml"], 2, "not valid JSON"),
     ("planners.view", ["{tmp}/motion.json"], 2, "motion.json"),
@@ -230,7 +233,7 @@ def test_robot_that_does_not_fit_the_tracks(files, capsys):
         "srs_opt.calibrate", [str(folder), "--robot", "{tmp}/lines/three.yaml"], files, capsys
     )
     assert status == 2, err
-    assert "5 markers" in err
+    assert "has 3 links" in err
     assert not out
 
 
