@@ -8,7 +8,6 @@ from functools import lru_cache
 import casadi as ca
 import numpy as np
 
-
 _building = threading.RLock()  # symbolic work and buffers are made by one thread at a time
 
 
