@@ -283,7 +283,8 @@ def test_a_missing_package_is_one_line(module, tmp_path):
     """A Python without the dependencies, as in a shell where nobody activated the environment."""
     done = subprocess.run(
         [sys.executable, "-S", "-m", module, *(["x.yaml"] if module == "planners.plan" else [])],
-        capture_output=True, text=True, check=False, cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True, text=True, check=False, cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
     )  # fmt: skip
     assert done.returncode == 2, done.stderr
     assert len(done.stderr.splitlines()) == 1
