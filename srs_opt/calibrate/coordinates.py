@@ -76,8 +76,8 @@ class Coordinate:
 def base_coordinates(robot: Robot) -> tuple[Coordinate, ...]:
     """Return the calibrated robot parameters: those with a bench deviation, and the nuisance v_s.
 
-    A deviation of 0 fixes a parameter. One that trials scatter about stays a coordinate (`FIXED_SD`): the scatter
-    needs its slopes.
+    A deviation of 0 fixes a parameter. One that trials scatter about stays a coordinate (`FIXED_SD`): the
+    scatter needs its slopes.
     """
     sds = {**ASSUMED_SD, **robot.relative_sd}
     free = {n for n, sd in sds.items() if sd > 0 and n in _CALIBRATED and getattr(robot, n) > 0}
