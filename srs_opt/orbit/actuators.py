@@ -13,6 +13,8 @@ from srs_opt.model.parameters import Structure
 from srs_opt.model.registry import build
 from srs_opt.simulate.integrate import Integrator
 
+_HAIR = 1e-6  # of central differences: errs by about 1e-10 from rounding and less from curvature
+
 
 def periodic_actuators(run: Integrator, gait: Gait, p: np.ndarray) -> np.ndarray:
     """Return the actuators' periodic state at time 0 (closed form where linear, else by settling)."""
@@ -33,7 +35,7 @@ def periodic_actuators(run: Integrator, gait: Gait, p: np.ndarray) -> np.ndarray
             stay = np.column_stack([one[:, 0], two[:, 0]])  # segments are alike
             state, decay = forced + stay @ state, stay @ decay
         return np.asarray(np.linalg.solve(np.eye(2) - decay, state)).ravel()
-    fine = np.maximum(np.ceil(durations / 0.0025).astype(int), 2)
+    fine = _fine(durations)
     act = np.zeros(n)
     for _ in range(200):
         following = act
@@ -44,6 +46,37 @@ def periodic_actuators(run: Integrator, gait: Gait, p: np.ndarray) -> np.ndarray
             return following
         act = following
     raise NoAnswerError("the curvature does not settle into a cycle within 200 periods under this gait")
+
+
+def actuator_multiplier(run: Integrator, gait: Gait, act: np.ndarray, p: np.ndarray) -> float:
+    """Return the largest modulus of the actuators' Floquet multipliers about their cycle.
+
+    exp(-period / max tau) where they are linear; else the spectral radius of d act(period) / d act(0), by
+    central differences.
+
+    Parameters
+    ----------
+    act : array (n,)
+        The periodic state at time 0.
+    p : array (np,)
+        As packed by the integrator.
+    """
+    if run.actuator.linear:
+        return float(np.exp(-gait.period_s / max(run.robot.tau1_s, run.robot.tau2_s)))
+    durations, valves = gait.phases()
+    hold = _hold_function(run.structure)
+    steps = _HAIR * (1 + np.abs(act))
+    ends = act[:, None] + np.hstack([np.diag(steps), -np.diag(steps)])
+    for h, valve, k in zip(durations, valves.T, _fine(durations)):
+        for _ in range(k):
+            ends = np.asarray(hold(ends, valve, h / k, p))
+    monodromy = (ends[:, : act.size] - ends[:, act.size :]) / (2 * steps)
+    return float(np.abs(np.linalg.eigvals(monodromy)).max())
+
+
+def _fine(durations: np.ndarray) -> np.ndarray:
+    """Return how many steps of the integration each phase takes where no closed form exists."""
+    return np.maximum(np.ceil(durations / 0.0025).astype(int), 2)
 
 
 @lru_cache(maxsize=32)

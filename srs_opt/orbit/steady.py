@@ -10,6 +10,7 @@ import numpy as np
 
 from srs_opt.errors import InputError, NoAnswerError
 from srs_opt.gait import Gait
+from srs_opt.orbit.actuators import actuator_multiplier
 from srs_opt.orbit.motion import CycleMotion, cycle_motion, rotate
 from srs_opt.orbit.solve import PeriodicSolution, search_orbit
 from srs_opt.robot import Robot
@@ -40,7 +41,7 @@ class Orbit:
     multipliers : complex array (d,)
         Floquet multipliers of the dynamic states (pose removed), largest first.
     shape_multiplier : float
-        Largest Floquet multiplier of the actuators, exp(-period / max tau).
+        Largest modulus of the actuators' Floquet multipliers; exp(-period / max tau) where they are linear.
     time_s, pose, kappa : arrays (n,), (n, 3), (n, N-1)
         One cycle from time 0 to the period, starting at pose 0.
     solution : PeriodicSolution
@@ -193,6 +194,7 @@ def _search(run: Integrator, gait: Gait, tolerance: float, guess: np.ndarray | N
 def orbit_of(run: Integrator, gait: Gait, solution: PeriodicSolution) -> Orbit:
     """Return the steady gait that a periodic solution is."""
     robot = run.robot
+    p = run.pack(gait.pressure_kpa, gait.frequency_hz)
     time_s = np.concatenate([[0.0], np.cumsum(solution.mesh.h_s)])
     states = np.concatenate([solution.start[:, None], solution.states], axis=1)
     pose, kappa = states[:3].T, states[run.layout.kappa].T
@@ -205,7 +207,7 @@ def orbit_of(run: Integrator, gait: Gait, solution: PeriodicSolution) -> Orbit:
         work_j=float(solution.states[WORK, -1]),
         dynamic=solution.start[run.layout.dynamic],
         multipliers=multipliers[np.argsort(-abs(multipliers))],
-        shape_multiplier=float(np.exp(-gait.period_s / max(robot.tau1_s, robot.tau2_s))),
+        shape_multiplier=actuator_multiplier(run, gait, solution.start[run.layout.actuator], p),
         time_s=time_s,
         pose=pose,
         kappa=kappa,

@@ -174,6 +174,26 @@ def test_multipliers_are_those_of_finite_differences():
     assert orbit.largest_multiplier < 1
 
 
+def test_the_actuators_multiplier_knows_their_effects():
+    """Against differences of the simulation, whose steps do not come from the orbit's own map."""
+    robot = wpi_srs().with_values(effects=[{"name": "fill_exhaust_asymmetry", "ratio": 1.5}])
+    gait = published_wave(robot).gait()
+    orbit = steady_gait(robot, gait, tolerance=1e-6)
+    run, s = integrator(robot), orbit.solution
+    p, act = run.pack(gait.pressure_kpa, gait.frequency_hz), run.layout.actuator
+    columns = []
+    for i in range(act.start, act.stop):
+        ends = []
+        for sign in (1, -1):
+            start = s.start.copy()
+            start[i] += sign * 1e-4
+            ends.append(run.steps(start, s.mesh, s.valve, p)[0][act, -1])
+        columns.append((ends[0] - ends[1]) / 2e-4)
+    expected = abs(np.linalg.eigvals(np.array(columns).T)).max()
+    assert orbit.shape_multiplier == pytest.approx(expected, rel=0.02)
+    assert orbit.shape_multiplier > 2 * steady_gait(wpi_srs(), gait).shape_multiplier
+
+
 def test_perturbed_motion_returns_at_the_rate_of_the_largest_multiplier():
     robot = wpi_srs().with_values(friction_speed_m_s=0.05)
     orbit = steady_gait(robot, FREE, tolerance=1e-6)
