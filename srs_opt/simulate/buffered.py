@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+import threading
 from functools import lru_cache
 
 import casadi as ca
 import numpy as np
 
+_building = threading.RLock()  # symbolic work and buffers are made by one thread at a time
 
-class Buffered:
-    """A function with its own argument and result arrays.
+
+class Buffered(threading.local):
+    """A function with its own argument and result arrays, separate ones in every thread.
 
     Arrays are (columns, rows): a CasADi matrix of shape (rows, columns) read in C order. Write into
     ``arguments[i]``, call `evaluate`, read ``results[i]`` (copy what must survive the next call).
+    `threading.local` calls ``__init__`` again in each thread that uses the object.
     """
 
     def __init__(self, function: ca.Function) -> None:
-        self._function = _dense(function)
-        self._buffer, self.evaluate = self._function.buffer()
+        with _building:
+            self._function = _dense(function)
+            self._buffer, self.evaluate = self._function.buffer()
         f = self._function
         self.arguments = [np.zeros((f.size2_in(i), f.size1_in(i))) for i in range(f.n_in())]
         self.results = [np.zeros((f.size2_out(i), f.size1_out(i))) for i in range(f.n_out())]
@@ -27,6 +32,7 @@ class Buffered:
             self._buffer.set_res(i, memoryview(array))  # type: ignore[arg-type]
 
 
+@lru_cache(maxsize=64)
 def _dense(function: ca.Function) -> ca.Function:
     """Return the function with dense arguments and results, which its buffers then are."""
     dense_in = all(function.nnz_in(i) == function.numel_in(i) for i in range(function.n_in()))
@@ -39,5 +45,5 @@ def _dense(function: ca.Function) -> ca.Function:
 
 @lru_cache(maxsize=64)
 def buffered(function: ca.Function) -> Buffered:
-    """Return the (one) buffered form of a function."""
+    """Return the buffered form of a function."""
     return Buffered(function)
