@@ -163,12 +163,30 @@ def run_command(
     except Exception as error:
         if os.environ.get("SRS_OPT_TRACEBACK"):
             raise
+        if isinstance(error, ModuleNotFoundError) and not _is_own(error.name):
+            print(f"{parser.prog}: {_missing_package(error.name)}", file=sys.stderr)
+            return 2
         print(
             f"{parser.prog}: a fault of the program, {type(error).__name__}: {one_line(error)[:300]} "
             "(SRS_OPT_TRACEBACK=1 shows where; please report it)",
             file=sys.stderr,
         )
         return FAULT
+
+
+def _is_own(module: str | None) -> bool:
+    """Whether a module that is missing should have been part of this project: then that is a bug."""
+    return module is None or module.partition(".")[0] in {"srs_opt", "planners"}
+
+
+def _missing_package(module: str | None) -> str:
+    """Return what to do about a package that this Python lacks."""
+    package = str(module).partition(".")[0]
+    return (
+        f"the Python that runs this, {sys.executable}, has no package '{package}': activate the environment "
+        "that has it ('. .venv/bin/activate' in the project's folder, after 'make run'), or install it: "
+        "'pip install .' in that folder"
+    )
 
 
 def _ready_streams() -> None:

@@ -27,6 +27,9 @@ SCATTER_SD = {
     "friction_normal": 0.03,
     "curvature_per_pressure_1_m_kpa": 0.01,
 }
+# Prior deviation (relative) of a value that the robot file fixes: far below what any data could resolve
+# (about 1e-4), so that tenfold either way changes no answer.
+FIXED_SD = 1e-9
 
 
 @dataclass(frozen=True)
@@ -59,12 +62,30 @@ class Coordinate:
     start: float = 0.0
     log: bool = False
 
+    @property
+    def fixed(self) -> bool:
+        """Whether the fit leaves it where it is; trials may still scatter about it."""
+        return self.prior_sd <= FIXED_SD
+
+    @property
+    def reported(self) -> bool:
+        """Whether it is a result: neither fixed nor a nuisance of the fit."""
+        return not self.fixed and self.name != FRICTION_SPEED
+
 
 def base_coordinates(robot: Robot) -> tuple[Coordinate, ...]:
-    """Return the calibrated robot parameters: those with a bench deviation, and the nuisance v_s."""
+    """Return the calibrated robot parameters: those with a bench deviation, and the nuisance v_s.
+
+    A deviation of 0 fixes a parameter. One that trials scatter about stays a coordinate (`FIXED_SD`): the
+    scatter needs its slopes.
+    """
     sds = {**ASSUMED_SD, **robot.relative_sd}
-    names = [n for n, sd in sds.items() if sd > 0 and n in _CALIBRATED and getattr(robot, n) > 0]
-    chosen = [Coordinate(name, prior_sd=sds[name]) for name in _CALIBRATED if name in names]
+    free = {n for n, sd in sds.items() if sd > 0 and n in _CALIBRATED and getattr(robot, n) > 0}
+    chosen = [
+        Coordinate(name, prior_sd=sds[name] if name in free else FIXED_SD)
+        for name in _CALIBRATED
+        if name in free or name in SCATTER_SD
+    ]
     low, high = (math.log(v / robot.friction_speed_m_s) for v in FRICTION_SPEED_RANGE_M_S)
     speed = Coordinate(FRICTION_SPEED, prior_sd=(high - low) / 2, start=(high + low) / 2, lower=low - 0.2)
     return (*chosen, speed)

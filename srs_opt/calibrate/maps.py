@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from srs_opt.calibrate.coordinates import FRICTION_SPEED, SCATTER_SD, Coordinate, base_coordinates
+from srs_opt.calibrate.coordinates import SCATTER_SD, Coordinate, base_coordinates
 from srs_opt.calibrate.experiment import Experiment, Point
 from srs_opt.calibrate.fit import fit, start_point
 from srs_opt.calibrate.gram import TrialGram, solve
@@ -177,5 +177,5 @@ def _sd_with_tracks(
     return {
         c.name: getattr(dataset.robot, c.name) * math.exp(point.values[c.name]) * float(sd)
         for c, sd in zip(base, np.sqrt(np.diag(covariance)))
-        if c.name != FRICTION_SPEED
+        if c.reported
     }

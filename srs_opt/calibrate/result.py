@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from srs_opt.calibrate.candidates import entry_after
-from srs_opt.calibrate.coordinates import FRICTION_SPEED, Coordinate
+from srs_opt.calibrate.coordinates import Coordinate
 from srs_opt.calibrate.fit import Fit
 from srs_opt.robot import Robot
 
@@ -47,10 +47,10 @@ class Calibration:
 
 
 def calibrated_robot(robot: Robot, fit: Fit) -> Robot:
-    """Return `robot` with the fit's values; v_s, a nuisance of the fit, keeps the robot's value."""
+    """Return `robot` with the fit's values; fixed values and v_s, a nuisance of the fit, stay."""
     changes, deviations, sources = {}, dict(robot.relative_sd), dict(robot.sources)
     for coordinate in fit.coordinates:
-        if not coordinate.effect and coordinate.name != FRICTION_SPEED:
+        if not coordinate.effect and coordinate.reported:
             name = coordinate.name
             changes[name] = getattr(robot, name) * math.exp(fit.point.values[name])
             deviations[name] = fit.sd[name]
@@ -62,7 +62,7 @@ def calibrated_robot(robot: Robot, fit: Fit) -> Robot:
 def calibration(robot: Robot, fit: Fit, before: float, after: float) -> Calibration:
     """Return the calibration behind a fit of the base coordinates."""
     corrected = calibrated_robot(robot, fit)
-    index = [i for i, c in enumerate(fit.coordinates) if c.name != FRICTION_SPEED]
+    index = [i for i, c in enumerate(fit.coordinates) if c.reported]
     names = [fit.coordinates[i].name for i in index]
     values = {n: fit.point.values[n] if "." in n else float(getattr(corrected, n)) for n in names}
     sds = {n: fit.sd[n] if "." in n else values[n] * fit.sd[n] for n in names}

@@ -81,7 +81,7 @@ class Hypothesis:
     def against_the_bench(self) -> str:
         """Return which calibrated value would lie far from its bench value; empty when none."""
         for coordinate in self.fit.coordinates:
-            if np.isfinite(coordinate.prior_sd) and not coordinate.effect:
+            if np.isfinite(coordinate.prior_sd) and not coordinate.effect and not coordinate.fixed:
                 off = (self.fit.point.values[coordinate.name] - coordinate.start) / coordinate.prior_sd
                 if abs(off) > FAR:
                     return (

@@ -67,7 +67,7 @@ def _parameters(found: Discrepancy) -> list[dict[str, Any]]:
         return []
     rows = []
     fits = [found.null.hypothesis.fit, found.selection.best.fit]
-    for coordinate in (c for c in fits[0].coordinates if not c.effect):
+    for coordinate in (c for c in fits[0].coordinates if not c.effect and not c.fixed):
         bench = getattr(found.dataset.robot, coordinate.name)
         values = [bench * math.exp(f.point.values[coordinate.name]) for f in fits]
         off = fits[1].point.values[coordinate.name] - coordinate.start

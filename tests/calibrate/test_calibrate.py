@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+import yaml
 
 from srs_opt.calibrate.__main__ import main
 from srs_opt.measurement.dataset import load_dataset
@@ -52,6 +53,29 @@ def test_truth_is_found(tmp_path, capsys, recording, design):
     robot = load_robot(tmp_path / "set" / "out" / "robot.yaml")
     assert robot.sources["tau1_s"] == "calibrated"
     assert robot.relative_sd["tau1_s"] == pytest.approx(answer["sd"]["tau1_s"] / robot.tau1_s)
+
+
+@pytest.mark.parametrize("maps", [False, True], ids=["tracks", "maps"])
+def test_a_deviation_of_zero_fixes_a_value(tmp_path, capsys, maps):
+    """Trials still scatter about a fixed friction and curvature per pressure."""
+    fixed = ("friction_tangential", "friction_normal", "curvature_per_pressure_1_m_kpa")
+    folder = made(tmp_path / "set", Recording(maps=maps, tracks=not maps))
+    record = yaml.safe_load((folder / "robot.yaml").read_text(encoding="utf-8"))
+    record |= {name: getattr(TRUTH.parameters, name) for name in fixed}
+    record["relative_sd"] |= dict.fromkeys(fixed, 0.0)
+    record["sources"] = {**record.get("sources", {}), **dict.fromkeys(fixed, "bench")}
+    (folder / "robot.yaml").write_text(yaml.safe_dump(record), encoding="utf-8")
+    answer, _ = calibrated(folder, capsys)
+    assert not set(fixed) & {*answer["parameters"], *answer["sd"], *answer["correlation"]}
+    assert "tau1_s" in answer["parameters"]
+    assert all(
+        abs(v - getattr(TRUTH.parameters, n)) < 4 * answer["sd"][n] for n, v in answer["parameters"].items()
+    )
+    robot = load_robot(folder / "out" / "robot.yaml")
+    for name in fixed:
+        assert getattr(robot, name) == pytest.approx(record[name], rel=1e-12)
+        assert robot.relative_sd[name] == 0
+        assert robot.sources[name] == "bench"
 
 
 def test_any_number_of_processes_gives_the_same(tmp_path, capsys):

@@ -276,3 +276,19 @@ def test_json_is_one_object(arguments, tmp_path):
     assert done.returncode == 0, done.stderr
     assert len(done.stdout.strip().splitlines()) == 1
     assert isinstance(json.loads(done.stdout), dict)
+
+
+@pytest.mark.parametrize("module", ["srs_opt.gait_opt", "planners.plan"])
+def test_a_missing_package_is_one_line(module, tmp_path):
+    """A Python without the dependencies, as in a shell where nobody activated the environment."""
+    done = subprocess.run(
+        [sys.executable, "-S", "-m", module, *(["x.yaml"] if module == "planners.plan" else [])],
+        capture_output=True, text=True, check=False, cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )  # fmt: skip
+    assert done.returncode == 2, done.stderr
+    assert len(done.stderr.splitlines()) == 1
+    assert sys.executable in done.stderr
+    assert ". .venv/bin/activate" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert "no package '" in done.stderr
