@@ -56,6 +56,13 @@ def build_parser() -> argparse.ArgumentParser:
     add("--effect", action="append", default=[], metavar="NAME", help="hidden effect of typical size")
     add("--noise", type=float, default=0.001, metavar="M", help="of a marker's coordinate (default 0.001)")
     add("--latency", type=float, default=0.03, metavar="S", help="of the camera (default 0.03)")
+    add(
+        "--slow-motion",
+        type=float,
+        default=1.0,
+        metavar="X",
+        help="X times slower than real time (default 1)",
+    )
     add("--duration", type=float, metavar="S", help="end by itself after so long")
     add("--seed", type=int, default=0, metavar="N", help="seed of the noise")
     return parser
@@ -101,12 +108,12 @@ class _Terminal:
         os.close(self._slave)
 
 
-def serve(world: World, terminal: _Terminal, camera: socket.socket, end_s: float) -> None:
+def serve(world: World, terminal: _Terminal, camera: _Quiet, end_s: float, slow_motion: float = 1.0) -> None:
     """Keep the world at real time until `end_s` seconds have passed or a signal comes."""
     world.sleep(0.05)  # loads compiled code
-    begun = time.monotonic() - world.now()
+    begun = time.monotonic() / slow_motion - world.now()
     late_told = False
-    while (passed := time.monotonic() - begun) < end_s:
+    while (passed := time.monotonic() / slow_motion - begun) < end_s:
         if data := terminal.read():
             world.write(data)
         while world.now() < passed - STEP_S / 2:
@@ -115,7 +122,7 @@ def serve(world: World, terminal: _Terminal, camera: socket.socket, end_s: float
             terminal.write(data)
         for line in world.pictures():
             camera.send(line)
-        behind = time.monotonic() - begun - world.now()
+        behind = time.monotonic() / slow_motion - begun - world.now()
         if behind > 0.1 and not late_told:
             print(f"warning: this machine is {behind:.2f} s behind real time", file=sys.stderr)
             late_told = True
@@ -144,7 +151,7 @@ def main(argv: list[str] | None = None) -> int:
         camera.setblocking(False)
         terminal = _Terminal(options.link)
         print(f"valves: {options.link}  poses: udp://{options.pose}", flush=True)
-        serve(world, terminal, _Quiet(camera), options.duration or float("inf"))
+        serve(world, terminal, _Quiet(camera), options.duration or float("inf"), options.slow_motion)
     except LabError as error:
         print(f"{PROG}: {error}", file=sys.stderr)
         return 2

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from planners.plan.__main__ import add_planning_options
-from srs_opt.command import Answer, Parser, make_parser, positive_int, run_command, say
+from srs_opt.command import Answer, Parser, make_parser, positive_float, positive_int, run_command, say
 
 if TYPE_CHECKING:
     from planners.pilot.session import PilotedDrive
@@ -38,6 +38,13 @@ def build_parser() -> Parser:
         help="udp://HOST:PORT (JSON lines), natnet://GROUP:PORT (rigid bodies 1 to N), ros2://TOPIC",
     )
     parser.add_argument(
+        "--slow-motion",
+        type=positive_float,
+        default=1.0,
+        metavar="X",
+        help="everything X times slower, to practise with virtual_lab.robot --slow-motion X (default 1)",
+    )
+    parser.add_argument(
         "--page",
         type=int,
         metavar="PORT",
@@ -56,7 +63,7 @@ def run(options: argparse.Namespace) -> Answer:
     from planners.plan.portfolio import Wish, solve
     from srs_opt.controller.program import Program
 
-    clock = MachineClock()
+    clock = MachineClock(options.slow_motion)
     port = open_port(options.valves, options.baud)
     problem = problem_from(options)
     source = open_source(options.pose, problem.robot, clock, lambda message: say(options, message))

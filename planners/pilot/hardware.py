@@ -9,15 +9,18 @@ from srs_opt.errors import InputError
 
 
 class MachineClock:
-    """The machine's monotonic clock."""
+    """The machine's monotonic clock; in slow motion it runs so many times slower."""
+
+    def __init__(self, slow_motion: float = 1.0) -> None:
+        self._slow_motion = slow_motion
 
     def now(self) -> float:
         """Return the time in seconds."""
-        return time.monotonic()
+        return time.monotonic() / self._slow_motion
 
     def sleep(self, seconds: float) -> None:
         """Wait."""
-        time.sleep(seconds)
+        time.sleep(seconds * self._slow_motion)
 
 
 def open_port(name: str, baud: int) -> Any:

@@ -25,6 +25,11 @@ MOST_WAY = 2000  # points of the way that are shown
 HOSTS = ("127.0.0.1", "localhost")
 
 
+def page_text() -> str:
+    """Return the page's HTML."""
+    return resources.files("planners.pilot").joinpath("live.html").read_text(encoding="utf-8")
+
+
 class LivePage:
     """What the page shows, and whether its stop button was pressed.
 
@@ -89,7 +94,8 @@ class LivePage:
 
     def _record(self, state: str, plant: PilotedPlant | None) -> dict[str, Any]:
         status = None if plant is None else plant.status
-        gait = "" if status is None or status.gait is None else self._names[status.gait]
+        joining = "joining cycle" if status is not None and status.cycles else ""
+        gait = joining if status is None or status.gait is None else self._names[status.gait]
         return {
             "state": state if status is None else f"{state}, controller {status.state.name.lower()}",
             "gait": gait,
@@ -114,8 +120,7 @@ class LivePage:
                 if self._is_foreign():
                     self.send_error(403)
                 elif path == "/":
-                    text = resources.files("planners.pilot").joinpath("live.html").read_text(encoding="utf-8")
-                    self._send(text, "text/html; charset=utf-8")
+                    self._send(page_text(), "text/html; charset=utf-8")
                 elif path in ("/room.json", "/state.json"):
                     self._send(page.room if path == "/room.json" else page.state, "application/json")
                 else:

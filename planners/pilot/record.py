@@ -11,10 +11,10 @@ import numpy as np
 from planners.pilot.observer import straight_pose
 from planners.pilot.pose import Sighting
 from srs_opt.errors import NoAnswerError
-from srs_opt.files import write_text
 from srs_opt.measurement.chain import chain_of
-from srs_opt.measurement.records import CENTRE_OF_MASS, TAIL_TO_HEAD
-from srs_opt.robot import Robot, save_robot
+from srs_opt.measurement.dataset import write_dataset as save
+from srs_opt.measurement.records import CENTRE_OF_MASS, TAIL_TO_HEAD, Applied, Bench, DataSet, Trial
+from srs_opt.robot import Robot
 from srs_opt.simulate.timeline import Timeline
 
 MARKER_SD_M = 0.001  # written into the set until its noise is measured
@@ -29,10 +29,13 @@ class DriveLog:
     sightings : list of Sighting
     valves : list of (time_s, states, pressure_kpa)
         From then on; states is the (N-1,) array of S.
+    rhythm_hz : list of float
+        Frequencies of the gaits played.
     """
 
     sightings: list[Sighting] = field(default_factory=list)
     valves: list[tuple[float, np.ndarray, float]] = field(default_factory=list)
+    rhythm_hz: list[float] = field(default_factory=list)
 
     def seen(self, sightings: Sequence[Sighting]) -> None:
         """Keep sightings."""
@@ -41,6 +44,8 @@ class DriveLog:
     def played(self, begin_s: float, timeline: Timeline) -> None:
         """Keep what the valves do from `begin_s` on, in place of what they were to do."""
         self.valves = [entry for entry in self.valves if entry[0] < begin_s - 1e-9]
+        if timeline.valve.any():
+            self.rhythm_hz.append(float(timeline.frequency_hz[0]))
         starts = begin_s + np.concatenate([[0.0], np.cumsum(timeline.duration_s)[:-1]])
         for k, start in enumerate(starts):
             self.valves.append((float(start), timeline.valve[:, k].copy(), float(timeline.pressure_kpa[k])))
@@ -49,6 +54,11 @@ class DriveLog:
         """Return S of every segment at a time, (N-1,); vented before the first entry."""
         states = [s for at, s, _ in self.valves if at <= time_s]
         return states[-1].astype(int) if states else np.zeros(segments, dtype=int)
+
+    @property
+    def frequency_hz(self) -> float:
+        """Mean rhythm of what was played (effects of the supply depend on it)."""
+        return float(np.mean(self.rhythm_hz)) if self.rhythm_hz else 1.0
 
     @property
     def begin_s(self) -> float:
@@ -67,8 +77,6 @@ def write_dataset(log: DriveLog, folder: Path, robot: Robot, latency_s: float) -
     NoAnswerError
         If the valves never moved or nothing was seen.
     """
-    from srs_opt.measurement.tracks import track_columns
-
     if not log.valves or not log.sightings:
         raise NoAnswerError("the robot never moved: there is no data set to write")
     seen = [s for s in log.sightings if s.time_s - latency_s >= log.begin_s]
@@ -79,34 +87,26 @@ def write_dataset(log: DriveLog, folder: Path, robot: Robot, latency_s: float) -
     tail = np.array([x - half * np.cos(heading), y - half * np.sin(heading)])
     time_s = np.array([s.time_s for s in seen]) - latency_s - log.begin_s
     markers = all(s.markers_m is not None for s in seen)
-    points = np.array([s.markers_m if markers else s.pose[None, :2] for s in seen]) - tail  # type: ignore[index]
-    duration_s = float(time_s[-1])
-    order = TAIL_TO_HEAD if markers else CENTRE_OF_MASS
-    rows = [",".join(track_columns(order, chain.links))]
-    for at, place in zip(time_s, points):
-        rows.append(",".join([f"{at:.6f}", *("" if np.isnan(v) else f"{v:.6f}" for v in place.ravel())]))
-    write_text(folder / "trials" / "drive.csv", "\n".join(rows) + "\n")
-    write_text(folder / "drives" / "drive.csv", _drive_table(log))
-    columns = "trial,frequency_hz,pressure_kpa,offset,phase_lag_rad,heading_rad,duration_s,kind"
-    pressure = max(p for _, _, p in log.valves)
-    row = f"drive,0,{pressure:g},0,0,{heading:.6f},{duration_s:.6f},gait"
-    write_text(folder / "trials.csv", f"{columns}\n{row}\n")
-    save_robot(robot, folder / "robot.yaml")
-    rate = (len(time_s) - 1) / duration_s
-    header = (
-        f"name: drive\nrobot: robot.yaml\ncamera:\n  rate_hz: {rate:.3f}\n  marker_sd_m: {MARKER_SD_M:g}\n"
-        f"markers: {order}\n"
+    points = np.array([s.markers_m if markers else s.pose[:2] for s in seen]) - tail  # type: ignore[index]
+    pressure_kpa = np.array([p for _, _, p in log.valves])
+    applied = Applied(
+        np.array([at for at, _, _ in log.valves]) - log.begin_s,
+        np.array([states for _, states, _ in log.valves], dtype=float),
+        pressure_kpa,
     )
-    write_text(folder / "dataset.yaml", header)  # last: an interrupted write does not look like a set
-    return folder
-
-
-def _drive_table(log: DriveLog) -> str:
-    """Return the chambers' pressures from each switch on, time 0 at the first."""
-    segments = log.valves[0][1].size
-    names = [f"{side}{k}_kpa" for k in range(1, segments + 1) for side in ("left", "right")]
-    rows = [",".join(["time_s", *names])]
-    for time_s, states, pressure in log.valves:
-        sides = [f"{max(s, 0) * pressure:g},{max(-s, 0) * pressure:g}" for s in states]
-        rows.append(",".join([f"{time_s - log.begin_s:.6f}", *sides]))
-    return "\n".join(rows) + "\n"
+    trial = Trial(
+        name="drive",
+        frequency_hz=log.frequency_hz,
+        pressure_kpa=float(pressure_kpa.max()),
+        offset=0.0,
+        phase_lag_rad=0.0,
+        heading_rad=float(heading),
+        duration_s=float(time_s[-1]),
+        time_s=time_s,
+        markers_m=points if markers else None,
+        centre_m=None if markers else points,
+        applied=applied,
+    )
+    rate = (len(time_s) - 1) / float(time_s[-1])
+    order = TAIL_TO_HEAD if markers else CENTRE_OF_MASS
+    return save(DataSet("drive", robot, rate, MARKER_SD_M, order, (trial,), (), Bench(), folder), folder)

@@ -147,8 +147,10 @@ def _natnet_frame(packet: bytes, sized: bool) -> dict[int, tuple[float, float, f
 
     for _ in range(section()):
         at = packet.index(b"\0", at) + 1
-        at += 12 * count()
-    at += 12 * section()
+        markers = count()  # it moves `at` itself
+        at += 12 * markers
+    others = section()
+    at += 12 * others
     bodies = {}
     for _ in range(section()):
         body, x, y, z = struct.unpack_from("<ifff", packet, at)

@@ -38,6 +38,7 @@ def build_parser() -> Parser:
     parser.add_argument(
         "--true-robot", type=Path, metavar="FILE", help="drive this robot instead (implies --execute)"
     )
+    parser.add_argument("--ros-path", type=Path, metavar="FILE", help="also write a nav_msgs/Path as YAML")
     parser.add_argument("--animate", type=Path, metavar="FILE", help="animation, .gif or (with ffmpeg) .mp4")
     return parser
 
@@ -180,6 +181,7 @@ def _pictures(
     options: argparse.Namespace, problem: Problem, result: PlanResult, execution: Execution | None
 ) -> list[Path]:
     from planners.plan.program import plan_program
+    from planners.plan.ros_path import save_ros_path
     from planners.view.animate import save_animation
     from planners.view.picture import save_plan_picture
     from planners.view.record import save_motion
@@ -189,6 +191,8 @@ def _pictures(
     driven = None if execution is None else execution.pose[:, :2]
     files = [*save_plan_picture(options.out / "plan", problem, result.plan, driven)]
     files.append(save_motion(options.out / "motion.json", problem, result.plan, execution))
+    if options.ros_path:
+        files.append(save_ros_path(result.plan, options.ros_path))
     files.append(write_program(plan_program(problem, result.plan), options.out / "plan_program.h"))
     if options.animate:
         files.append(save_animation(options.animate, problem, result.plan, execution))

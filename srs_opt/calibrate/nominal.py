@@ -11,7 +11,7 @@ from srs_opt.calibrate.model import Conditions, Model, Packed, Values
 from srs_opt.calibrate.start import start_pose
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait, Wave
-from srs_opt.measurement.records import Schedule, Trial
+from srs_opt.measurement.records import Applied, Schedule, Trial
 from srs_opt.model.parameters import Structure
 from srs_opt.model.registry import build
 from srs_opt.simulate.integrate import step_kernel
@@ -78,10 +78,25 @@ def timeline_of(trial: Trial, segments: int) -> Timeline:
     end = float(trial.time_s[-1]) + _TAIL_S
     if trial.kind == "still":
         return Timeline.vent(segments, end, trial.pressure_kpa)
+    if trial.applied is not None:
+        return _applied(trial.applied, end, trial)
     if trial.schedule is not None:
         return _scheduled(trial.schedule, segments, end, trial)
     wave = Wave.uniform(segments, trial.frequency_hz, trial.pressure_kpa, trial.phase_lag_rad, trial.offset)
     return Timeline.of_gait(wave.gait(), end)
+
+
+def _applied(applied: Applied, end_s: float, trial: Trial) -> Timeline:
+    """Play what was recorded; its last row holds until the end.
+
+    A trial has one pressure among the equations' parameters. Curvature follows pressure times S, so that what
+    the regulator did goes into S, a share of the trial's pressure.
+    """
+    within = applied.time_s < end_s - 1e-9
+    durations = np.diff(np.append(applied.time_s[within], end_s))
+    share = applied.pressure_kpa[within] / trial.pressure_kpa if trial.pressure_kpa > 0 else 0.0
+    valve = (applied.state[within] * np.reshape(share, (-1, 1))).T
+    return Timeline.constant(durations, valve, trial.pressure_kpa, trial.frequency_hz or 1.0)
 
 
 def _scheduled(schedule: Schedule, segments: int, end_s: float, trial: Trial) -> Timeline:

@@ -15,6 +15,8 @@ from srs_opt.errors import InputError
 from srs_opt.files import write_text, write_with
 from srs_opt.gait_file import SCHEDULE_COLUMNS
 from srs_opt.measurement import bench_files, read
+from srs_opt.measurement.applied import FOLDER as APPLIED_FOLDER
+from srs_opt.measurement.applied import applied_text
 from srs_opt.measurement.records import (
     CENTRE_OF_MASS,
     CONDITIONS,
@@ -78,6 +80,8 @@ def write_dataset(dataset: DataSet, folder: Path | str) -> Path:
     save_robot(dataset.robot, folder / "robot.yaml")
     for trial in dataset.trials:
         _write_track(trial, folder / "trials" / f"{trial.name}.csv")
+        if trial.applied is not None:
+            write_text(folder / APPLIED_FOLDER / f"{trial.name}.csv", applied_text(trial.applied))
     for schedule in {t.schedule.name: t.schedule for t in dataset.trials if t.schedule}.values():
         rows = ((s, _text(on), _text(off), _text(schedule.period_s)) for s, on, off in schedule.intervals)
         _write_table(folder / "schedules" / f"{schedule.name}.csv", SCHEDULE_COLUMNS, rows)

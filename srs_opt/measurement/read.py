@@ -10,6 +10,8 @@ from typing import Any
 from srs_opt.document import Document, read_yaml, unknown_word
 from srs_opt.errors import InputError
 from srs_opt.gait_file import SCHEDULE_COLUMNS
+from srs_opt.measurement.applied import FOLDER as APPLIED_FOLDER
+from srs_opt.measurement.applied import read_applied
 from srs_opt.measurement.bench_files import read_bench, read_maps
 from srs_opt.measurement.plausible import check_robot, check_trial_row
 from srs_opt.measurement.records import (
@@ -181,12 +183,13 @@ def _read_trial(
     kind = row.word("kind", KINDS, "gait", report)
     schedule = _read_schedule(folder, row, header.robot, schedules, report)
     idle = 0.0 if kind != "gait" else None
+    no_wave = 0.0 if schedule or (folder / APPLIED_FOLDER / f"{name}.csv").is_file() else idle
     frequency = row.number("frequency_hz", report, 1 / schedule.period_s if schedule else idle)
     values = {
         "frequency_hz": frequency,
         "pressure_kpa": row.number("pressure_kpa", report, idle),
-        "offset": row.number("offset", report, 0.0 if schedule else idle),
-        "phase_lag_rad": row.number("phase_lag_rad", report, 0.0 if schedule else idle),
+        "offset": row.number("offset", report, no_wave),
+        "phase_lag_rad": row.number("phase_lag_rad", report, no_wave),
         "heading_rad": row.number("heading_rad", report, 0.0 if kind != "gait" else None),
         "duration_s": row.number("duration_s", report),
     }
@@ -205,6 +208,7 @@ def _read_trial(
         markers_m=track.points_m if header.markers == TAIL_TO_HEAD else None,
         centre_m=track.points_m[:, 0] if header.markers == CENTRE_OF_MASS else None,
         schedule=schedule,
+        applied=read_applied(folder, name, header.robot, values["pressure_kpa"], report),
         tether=row.yes("tether", True, report),
         floor=row.text("floor") or None,
         replicate_of=row.text("replicate_of") or None,

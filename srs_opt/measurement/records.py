@@ -57,6 +57,24 @@ class Schedule:
 
 
 @dataclass(frozen=True, eq=False)
+class Applied:
+    """What the chambers were given over time, as recorded, in place of a gait.
+
+    Attributes
+    ----------
+    time_s : ndarray, shape (K,)
+        From 0; each row holds until the next one.
+    state : ndarray, shape (K, N-1)
+        S of every segment, -1 (right) to 1 (left); 0 is vented, between lies a share of the pressure.
+    pressure_kpa : ndarray, shape (K,)
+    """
+
+    time_s: Array
+    state: Array
+    pressure_kpa: Array
+
+
+@dataclass(frozen=True, eq=False)
 class Trial:
     """One recorded run.
 
@@ -72,6 +90,8 @@ class Trial:
         Centre of mass, where the set records that alone.
     schedule : Schedule or None
         Switch times, where they are not the valve wave (13).
+    applied : Applied or None
+        What was applied, where it is neither.
     tether : bool
         Whether the air tubes were attached.
     floor : str or None
@@ -93,6 +113,7 @@ class Trial:
     markers_m: Array | None = None
     centre_m: Array | None = None
     schedule: Schedule | None = None
+    applied: Applied | None = None
     tether: bool = True
     floor: str | None = None
     replicate_of: str | None = None
@@ -101,6 +122,8 @@ class Trial:
     @property
     def period_s(self) -> float:
         """Period of the gait (infinite when nothing repeats)."""
+        if self.applied is not None:
+            return float("inf")
         if self.schedule is not None:
             return self.schedule.period_s
         return 1 / self.frequency_hz if self.frequency_hz > 0 else float("inf")

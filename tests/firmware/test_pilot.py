@@ -1,7 +1,6 @@
 """The pilot against the virtual snake: firmware, valve line and camera in the loop, on a virtual clock."""
 
 import json
-import math
 import shutil
 import urllib.error
 import urllib.request
@@ -20,10 +19,12 @@ from planners.pilot.protocol import Command, Fault
 from planners.pilot.record import DriveLog
 from planners.pilot.session import connect, pilot
 from planners.plan.program import plan_program
+from srs_opt.calibrate.run import calibrate
 from srs_opt.controller.c_source import write_program
 from srs_opt.controller.program import Program
 from srs_opt.errors import InputError
 from srs_opt.measurement.chain import chain_of, link_positions
+from srs_opt.measurement.dataset import load_dataset
 from srs_opt.orbit.steady import integrator
 from srs_opt.robot import wpi_srs
 from srs_opt.simulate.timeline import Timeline
@@ -131,36 +132,21 @@ def test_a_robot_that_lies_elsewhere_or_holds_other_gaits_is_not_started(arena):
         connect(session.world, session.world, fewer)
 
 
-def test_the_drive_becomes_a_data_set(arena, tmp_path):
+@pytest.mark.slow
+def test_the_drive_becomes_a_data_set_that_calibrates(arena, tmp_path):
     from planners.pilot.record import write_dataset
 
     session = virtual_pilot(arena)
     driven = session.run(lambda plant: None)
     folder = write_dataset(driven.log, tmp_path / "set", arena.problem.robot, driven.latency.value_s)
-    track = np.genfromtxt(folder / "trials" / "drive.csv", delimiter=",", names=True)
-    valves = np.genfromtxt(folder / "drives" / "drive.csv", delimiter=",", names=True)
-    assert track["time_s"][0] == pytest.approx(0, abs=0.02)
-    assert abs(track["x1_m"][0]) < 0.003 and abs(track["y1_m"][0]) < 0.003
-    assert valves["time_s"][0] == 0 and valves["left1_kpa"].max() > 30
-    assert not np.any((valves["left1_kpa"] > 0) & (valves["right1_kpa"] > 0))
-    # the recorded valves, played on the model, go where the camera saw the robot go
-    states = np.stack(
-        [np.sign(valves[f"left{k}_kpa"]) - np.sign(valves[f"right{k}_kpa"]) for k in range(1, 5)]
-    )
-    pressure = np.maximum.reduce([valves[f"{s}{k}_kpa"] for s in ("left", "right") for k in range(1, 5)])
-    steps = np.diff(valves["time_s"])
-    count = int(np.searchsorted(valves["time_s"], 3.0))
-    run = integrator(arena.problem.robot, "complex")
-    timeline = Timeline(steps[:count], states[:, :count], pressure[:count], np.full(count, 2.0))
-    end = float(steps[:count].sum())
-    moved = run.run(timeline, run.rest()).final[:2]
-    near = int(np.searchsorted(track["time_s"], end))
-    seen = np.array([[track[f"{a}{i}_m"][near] for a in "xy"] for i in range(1, 6)]).mean(axis=0)
-    turned = arena.problem.start.heading
-    c, s = math.cos(turned), math.sin(turned)
-    half = 2 * chain_of(wpi_srs()).pitch_m
-    wanted = np.array([c * (moved[0] + half) - s * moved[1], s * (moved[0] + half) + c * moved[1]])
-    assert np.hypot(*(seen - wanted)) < 0.02
+    (trial,) = load_dataset(folder).trials
+    assert trial.time_s[0] == pytest.approx(0, abs=0.02) and np.abs(trial.markers_m[0, 0]).max() < 0.004
+    assert trial.applied.time_s[0] == 0 and set(np.unique(trial.applied.state)) <= {-1, 0, 1}
+    # the recorded valves, played on the model, take the robot where the camera saw it
+    found = calibrate(load_dataset(folder))
+    assert found.after < 2.0  # of the noise, over a whole drive
+    for name in ("friction_tangential", "friction_normal", "curvature_per_pressure_1_m_kpa"):
+        assert found.parameters[name] == pytest.approx(getattr(wpi_srs(), name), rel=0.06)
 
 
 def test_the_observer_finds_offset_drift_and_latency():

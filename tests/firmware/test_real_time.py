@@ -1,4 +1,4 @@
-"""The whole chain on this machine in real time: plan, pilot, valve line, firmware, snake, data set."""
+"""The whole chain on this machine, on its clock: plan, pilot, valve line, firmware, snake, data set."""
 
 import contextlib
 import json
@@ -17,6 +17,8 @@ from planners.pilot.protocol import State
 from planners.pilot.valve_line import ValveLine
 
 ROOT = Path(__file__).parents[2]
+# four processes share two cores here; a decision that comes late on a busy machine is no fault of the pilot
+SLOW = ("--slow-motion", "4")
 pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler"),
@@ -37,7 +39,7 @@ def _snake(header, tmp_path):
     link = tmp_path / "valves"
     words = ["--program", header, "--start", "0.2,1.024,0", "--link", link, "--pose", f"127.0.0.1:{port}"]
     process = subprocess.Popen(
-        [sys.executable, "-m", "virtual_lab.robot", *map(str, words), "--duration", "120"],
+        [sys.executable, "-m", "virtual_lab.robot", *map(str, words), "--duration", "120", *SLOW],
         stdout=subprocess.PIPE,
         text=True,
         cwd=ROOT,
@@ -55,21 +57,16 @@ def _snake(header, tmp_path):
 def command(snake, out):
     link, poses = snake
     words = ["planners.pilot", "mazes/first.yaml", "--valves", str(link), "--pose", poses, "--out", str(out)]
-    return [sys.executable, "-m", *words, "--json"]
+    return [sys.executable, "-m", *words, "--json", *SLOW]
 
 
-def test_a_maze_is_piloted_in_real_time(snakes, tmp_path):
-    # on a machine that is busy with something else a decision may come too late once too often: the robot
-    # then stands, vented and untouched, which is no arrival
-    for attempt in range(3):
-        with snakes() as snake:
-            out = tmp_path / f"out{attempt}"
-            done = subprocess.run(command(snake, out), capture_output=True, text=True, cwd=ROOT)
-        record = json.loads(done.stdout)
-        assert record["execution"]["collisions"] == 0
-        if record["execution"]["reached"]:
-            break
+def test_a_maze_is_piloted_on_the_machines_clock(snakes, tmp_path):
+    with snakes() as snake:
+        out = tmp_path / "out"
+        done = subprocess.run(command(snake, out), capture_output=True, text=True, cwd=ROOT)
     assert done.returncode == 0, done.stderr
+    record = json.loads(done.stdout)["execution"]
+    assert record["reached"] and record["smallest_clearance_m"] > 0
     written = {path.name for path in out.iterdir()}
     assert written >= {"pilot.json", "motion.json", "dataset", "plan.png"}
 
@@ -88,13 +85,13 @@ def test_a_pilot_that_is_killed_leaves_a_vented_robot(snakes, tmp_path):
             line = pilot.stderr.readline()
             assert line, told  # it ended before it drove
             told += line
-        time.sleep(2.0)
+        time.sleep(6.0)
         pilot.kill()
         pilot.wait()
         pilot.stderr.close()
-        time.sleep(1.0)
+        time.sleep(4.0)  # a second of the robot's
         port = open_port(str(snake[0]), 115_200)
-        line = ValveLine(port, MachineClock())
+        line = ValveLine(port, MachineClock(float(SLOW[1])))
         line.ping()
         status = line.query()
         port.close()
