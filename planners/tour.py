@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import os
 import shlex
 import sys
 import time
@@ -16,6 +17,8 @@ from typing import Any
 from srs_opt.command import Answer, make_parser, run_command, say
 
 MAZE = Path("mazes/first.yaml")
+NEXT_MAZE = "mazes/u_turn.yaml"
+ACTIVATE = ".venv/bin/activate"
 
 
 def _run(module: str, shown: str, arguments: list[str], options: argparse.Namespace) -> tuple[Answer, float]:
@@ -68,6 +71,9 @@ def run(options: argparse.Namespace) -> Answer:
     )
     answers = [_run(*step, options) for step in steps]
     gait, gaits, drive, plan = (answer for answer, _ in answers)
+    if plan.record["status"] == "solved":
+        folder = str(out / "plan")
+        answers.append(_run("planners.view", "python -m planners.view", [folder, "--out", folder], options))
     record = {
         "gait_opt": gait.record,
         "gait_map": gaits.record,
@@ -76,7 +82,8 @@ def run(options: argparse.Namespace) -> Answer:
         "seconds": sum(seconds for _, seconds in answers),
     }
     files = tuple(path for answer, _ in answers for path in answer.files)
-    return Answer(record, _summary(record), all(answer.good for answer, _ in answers), files)
+    summary = f"{_summary(record)}\n{_next(out)}"
+    return Answer(record, summary, all(answer.good for answer, _ in answers), files)
 
 
 def _summary(record: dict[str, Any]) -> str:
@@ -107,6 +114,14 @@ def _summary(record: dict[str, Any]) -> str:
             f"closest {1000 * execution['smallest_clearance_m']:.0f} mm to a wall"
         )
     return "\n".join(lines)
+
+
+def _next(out: Path) -> str:
+    """Return what to open and the exact line to type next."""
+    page = out / "plan" / "view.html"
+    lines = [f"To replay the drive, open {page} in a browser."] if page.exists() else []
+    activate = "" if os.environ.get("VIRTUAL_ENV") or not Path(ACTIVATE).exists() else f". {ACTIVATE} && "
+    return "\n".join([*lines, "Next, type:", f"  {activate}plan {NEXT_MAZE} --execute"])
 
 
 def main(argv: list[str] | None = None) -> int:

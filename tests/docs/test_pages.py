@@ -13,6 +13,7 @@ from blocks import Block, blocks, commands, same_line, same_output
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = sorted([ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").rglob("*.md")])
 SHOWN_ONLY = {"", "text", "toml", "csv", "json", "c", "mermaid", "yaml", "html", "make"}
+ACTIVATE = ".venv/bin/activate"
 SLOW_PAGES = {"README.md", "tutorial.md", "measure.md", "commands.md", "maze.md"}
 
 
@@ -32,14 +33,25 @@ def desk(tmp_path, monkeypatch) -> Path:
     for name in ("mazes", "examples", "virtual_lab", "docs", "firmware"):
         (tmp_path / name).symlink_to(ROOT / name)
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("PATH", f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
+    own = Path(sys.executable).parent
+    if sys.prefix != sys.base_prefix:  # a shell in which nobody has activated the environment
+        rest = [folder for folder in os.environ["PATH"].split(os.pathsep) if Path(folder) != own]
+        monkeypatch.setenv("PATH", os.pathsep.join(rest))
+    (tmp_path / ".venv" / "bin").mkdir(parents=True)
+    (tmp_path / ACTIVATE).write_text(f'export PATH="{own}{os.pathsep}$PATH"\n', encoding="utf-8")
     monkeypatch.setenv("OMP_NUM_THREADS", "1")
     monkeypatch.setenv("COLUMNS", "100")
     return tmp_path
 
 
-def run_console(block: Block) -> None:
+def run_console(block: Block, monkeypatch) -> None:
     for command, status, shown in commands(block):
+        if command == f". {ACTIVATE}":  # holds for the rest of the page
+            path = subprocess.run(
+                ["bash", "-c", f'{command} && printf %s "$PATH"'], capture_output=True, text=True, check=True
+            )
+            monkeypatch.setenv("PATH", path.stdout)
+            continue
         done = subprocess.run(
             ["bash", "-c", command], capture_output=True, text=True, timeout=550, check=False
         )
@@ -70,7 +82,7 @@ def page_id(path: Path) -> str:
     [pytest.param(p, marks=pytest.mark.slow if p.name in SLOW_PAGES else ()) for p in PAGES],
     ids=page_id,
 )
-def test_blocks_of_a_page(page, desk):
+def test_blocks_of_a_page(page, desk, monkeypatch):
     names: dict = {"__name__": "page"}
     for block in blocks(page.read_text(encoding="utf-8")):
         if block.file:
@@ -78,11 +90,23 @@ def test_blocks_of_a_page(page, desk):
         elif block.skip is not None:
             assert block.skip, f"{page.name}:{block.line}: a skipped block needs a reason"
         elif block.language in ("console", "bash"):
-            run_console(block)
+            run_console(block, monkeypatch)
         elif block.language == "python":
             run_python(block, names)
         else:
             assert block.language in SHOWN_ONLY, f"{page.name}:{block.line}: {block.language} is not tested"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=page_id)
+def test_a_page_activates_the_environment_before_its_commands(page):
+    typed = [
+        command
+        for block in blocks(page.read_text(encoding="utf-8"))
+        if block.language in ("console", "bash")
+        for command, _, _ in commands(block)
+        if not command.startswith("make ")
+    ]
+    assert not typed or page.name == "CONTRIBUTING.md" or typed[0] == f". {ACTIVATE}"
 
 
 def test_readme_is_short():
