@@ -16,7 +16,8 @@ $(STAMP): pyproject.toml constraints.txt
 run: venv
 	$(PY) -m planners.tour --out out
 
-# The whole chain on this machine: plan, pilot, serial line, C firmware, virtual snake, data set.
+# The whole chain on this machine: plan, pilot, serial line, C firmware, virtual snake, data set, calibration, and
+# a plan for the calibrated robot (its gait table is built first, some minutes).
 pilot: venv
 	mkdir -p out/pilot
 	$(PY) -c "from srs_opt.gait_opt.catalogue import default_table; from srs_opt.robot import wpi_srs; \
@@ -26,7 +27,10 @@ pilot: venv
 	$(PY) -m virtual_lab.robot --program out/pilot/gait_table.h --start 0.2,1.024,0 --link out/pilot/valves \
 	  --effect tether_drag --duration 90 & \
 	sleep 5; $(PY) -m planners.pilot mazes/first.yaml --valves out/pilot/valves --pose udp://127.0.0.1:5005 \
-	  --out out/pilot; status=$$?; kill %1 2>/dev/null; wait; exit $$status
+	  --out out/pilot; status=$$?; kill $$!; wait; exit $$status
+	$(PY) -m planners.view out/pilot --out out/pilot
+	$(PY) -m srs_opt.calibrate out/pilot/dataset --out out/pilot/calibrated
+	$(PY) -m planners.plan mazes/first.yaml --robot out/pilot/calibrated/robot.yaml --out out/pilot/again
 
 lint: venv
 	$(VENV)/bin/ruff check .
