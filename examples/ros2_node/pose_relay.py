@@ -1,6 +1,6 @@
 """A ROS 2 node without a package: takes tracked rigid bodies of the links, sends their centres to the pilot.
 
-    source /opt/ros/DISTRO/setup.bash
+    (after the set-up script of your ROS 2 installation)
     python3 examples/ros2_node/pose_relay.py --links 5 --topic /mocap/link --to 127.0.0.1:5005
     python -m planners.pilot maze.yaml --valves /dev/ttyACM0 --pose udp://127.0.0.1:5005
 
