@@ -153,6 +153,8 @@ class Drive:
         at_rest = self.before == self.problem.motion.rest
         if at_rest and self.played and self._at_goal():
             return self._done("arrived")  # it rolled out into the goal
+        if self.plant.lost:
+            return self._stop(self.plant.lost)
         gait = self._next_gait()
         if gait is None:
             reason = "no gait keeps the body off the walls and no other way was found"

@@ -39,6 +39,8 @@ class Plant(Protocol):
     ----------
     waits : bool
         Whether time stands still between two motions, as in a simulation.
+    lost : str
+        Why the robot must halt for good, if it must.
     robot : Robot
         For its body's width and valve delay.
     run : Integrator
@@ -48,6 +50,7 @@ class Plant(Protocol):
     """
 
     waits: bool
+    lost: str
     robot: Robot
     run: Integrator
     state: Array
@@ -62,7 +65,7 @@ class SimulatedPlant:
     Commands reach its valves late by a constant; that delay is waited once, before the first cycle.
     """
 
-    waits = True
+    waits, lost = True, ""
 
     def __init__(self, problem: Problem, robot: Robot) -> None:
         self.robot = robot

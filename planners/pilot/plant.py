@@ -95,6 +95,7 @@ class PilotedPlant:
         self._returned_s = math.inf
         self._thinking_s = 0.0
         self.latency = Latency()
+        self.lost = ""
         self.body = np.zeros((0, 2))  # centre line of the body now, in the room
         self.clearance_m = math.inf  # of the body now
         self.corrections: list[tuple[float, float]] = []  # offset (m) and residual (m) of every cycle
@@ -204,8 +205,9 @@ class PilotedPlant:
             raise PlantStopped(f"the valve line is gone: {error}", may_go_on=False) from error
         self._camera.poll()
         if self._clock.now() - self._camera.last_arrived_s > POSE_LOST_S:
-            self.stop()
-            raise PlantStopped(f"no pose for {POSE_LOST_S:g} s; vented", may_go_on=False)
+            # Venting at once lets the body roll on and straighten, 0.3 m from full speed. The cycle is played
+            # to its end instead, the model knows where that is, and the driver brakes where there is room.
+            self.lost = f"no pose for {POSE_LOST_S:g} s; halted and vented"
 
     def _look(self) -> None:
         """Take over what the camera has seen."""
@@ -217,7 +219,7 @@ class PilotedPlant:
         """Stop where the robot strays, or where what is left of the cycle would touch a wall."""
         self._look()
         correction = correct(motion, begin_s, self._seen, self.latency, self._chain)
-        if correction.seen < 3:
+        if correction.seen < 3 or self.lost:
             return
         left = motion.time_s > self._clock.now() - begin_s
         corrected = correction.apply(motion)
@@ -242,6 +244,8 @@ class PilotedPlant:
             coasting = motion.then(coasting)
         self._log.played(self._clock.now(), vent)
         self.state = self._rest()
+        if self.lost:
+            self.state = self._problem.as_planned(coasting.final)
         return coasting
 
     def _stop(self, reason: str, may_go_on: bool) -> None:
@@ -264,9 +268,14 @@ class PilotedPlant:
             status = self._line.status
             last = self._straight(self._clock.now() - REST_S)
             still = len(last) > 3 and float(np.ptp(last[:, :2], axis=0).max()) < 4 * REST_M
-            if status is not None and status.state == 0 and still and self._clock.now() - begun_s > REST_S:
+            if (
+                status is not None
+                and status.state == 0
+                and (still or self.lost)
+                and self._clock.now() - begun_s > REST_S
+            ):
                 break
-        return self._resting_state()
+        return self.state if self.lost else self._resting_state()
 
     def _resting_state(self) -> Array:
         """Return the state of rest where the camera sees the robot: the median of its last looks."""
