@@ -6,7 +6,7 @@ import numpy as np
 
 from srs_opt.gait import Gait
 from srs_opt.gait_opt.collocation.layout import DEGREE
-from srs_opt.gait_opt.collocation.point import BODY, BODY_NAMES
+from srs_opt.gait_opt.collocation.point import BODY, BODY_NAMES, PointKind
 from srs_opt.gait_opt.collocation.program import Program, Solution
 
 _WORDS = {
@@ -39,7 +39,7 @@ def worst_equation(p: Program, rows: np.ndarray, gait: Gait) -> str:
         point, state = np.unravel_index(int(residual.argmax()), residual.shape)
         if residual[point, state] > worst:
             worst = float(residual[point, state])
-            name = BODY_NAMES[state] if state < BODY else _actuator_name(int(state) - BODY, kind.segments)
+            name = BODY_NAMES[state] if state < BODY else _shape_name(int(state) - BODY, kind)
             element = int(point) // DEGREE
             when = element / p.layout.elements * gait.period_s
             text = f"{name} about {when:.3f} s into the cycle, off by {worst:.1e} of its size"
@@ -47,6 +47,7 @@ def worst_equation(p: Program, rows: np.ndarray, gait: Gait) -> str:
     return text
 
 
-def _actuator_name(index: int, segments: int) -> str:
-    what = ("curvature", "curvature rate", "hysteresis")[min(index // segments, 2)]
-    return f"{what} of segment {index % segments + 1}"
+def _shape_name(index: int, kind: PointKind) -> str:
+    bends = ("bend", "bend rate") if kind.bends else ()
+    names = (*bends, "curvature", "curvature rate", "hysteresis")
+    return f"{names[min(index // kind.segments, len(names) - 1)]} of segment {index % kind.segments + 1}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -10,11 +11,11 @@ from srs_opt.gait import Gait
 from srs_opt.gait_opt.collocation.layout import ENVELOPE_UNIT_M, PRESSURE_UNIT_KPA, Layout
 from srs_opt.gait_opt.collocation.layout import Mesh as CycleMesh
 from srs_opt.gait_opt.collocation.point import BODY, PointKind, linear_shape
-from srs_opt.model.registry import build
+from srs_opt.model.registry import build, state_layout
 from srs_opt.orbit.motion import rotate
 from srs_opt.orbit.steady import Orbit
 from srs_opt.robot import Robot
-from srs_opt.simulate.rosenbrock import BODY_STATES, VELOCITY
+from srs_opt.simulate.rosenbrock import VELOCITY
 
 _STRAIGHT = 1e-6  # turn per cycle below which a gait counts as straight, rad
 
@@ -82,7 +83,10 @@ def states_over_cycle(
     places = (at * period + first_s) % period
     columns = [np.interp(places, time_s, states[VELOCITY][i]) for i in range(3)]
     columns += [np.interp(places, spread, v) for v in (heading + tilt, ahead, aside)]
-    if kind.states > BODY:
+    if kind.bends:
+        layout = state_layout(kind.structure)
+        columns += [np.interp(places, time_s, row) for row in states[layout.kappa.start : layout.dkappa.stop]]
+    if kind.states > kind.moving:
         columns += _deviations(robot, kind, orbit, states, places, at, first_s)
     return np.stack(columns, axis=1), speed
 
@@ -112,14 +116,14 @@ def _deviations(
     at: np.ndarray,
     first_s: float,
 ) -> list[np.ndarray]:
-    gait = orbit.gait
+    gait, own = orbit.gait, states[state_layout(kind.structure).actuator]
     if kind.relaxed:
-        return [np.interp(places, orbit.time_s, row) for row in states[BODY_STATES:]]
+        return [np.interp(places, orbit.time_s, row) for row in own]
     p = parameter_numbers(robot, kind)
     closed = linear_shape(replace(kind, ordered=False), at.size)(
         switches_of(gait, first_s), gait.frequency_hz, gait.pressure_kpa, at[None], p, 0.01
     )
-    actuators = np.stack([np.interp(places, orbit.time_s, row) for row in states[BODY_STATES:]])
+    actuators = np.stack([np.interp(places, orbit.time_s, row) for row in own])
     n = kind.segments
     actuators[:n] -= np.asarray(closed[0])
     actuators[n : 2 * n] -= np.asarray(closed[1])
@@ -150,7 +154,7 @@ def unknowns_from_orbits(
     for r, (robot, orbit) in enumerate(zip(robots, orbits)):
         kind = layout.kinds[r]
         x, speed = states_over_cycle(robot, kind, orbit, mesh.points(), first_s)
-        scale = state_scales(x) if scales is None else scales[r]
+        scale = state_scales(x, kind) if scales is None else scales[r]
         found.append(scale)
         z[layout.states(r)] = (x / scale).ravel()
         right, left = orbit.envelope_m
@@ -160,11 +164,12 @@ def unknowns_from_orbits(
     return z, found
 
 
-def state_scales(x: np.ndarray) -> np.ndarray:
+def state_scales(x: np.ndarray, kind: PointKind) -> np.ndarray:
     """Return typical sizes of the states over a cycle, (states,)."""
     size = np.abs(x).max(axis=0)
     groups = [(0, 2), (2, 3), (3, 4), (4, 6)]
-    groups += [(BODY, x.shape[1])] if x.shape[1] > BODY else []
+    edges = sorted({BODY, BODY + kind.bends // 2, kind.moving, kind.states})
+    groups += list(pairwise(edges))
     least = np.full(x.shape[1], 1e-3)
     least[2] = 1e-6
     for a, b in groups:

@@ -12,6 +12,8 @@ unknowns:
 with the means of `ahead` and `aside` zero. The body's velocity u and yaw momentum follow the model; the
 curvature is known in closed form. Effects that make the actuators nonlinear add their *deviation* from
 the closed form as states, so that valve switches still need no mesh point.
+
+In the compliant model this curvature is that without load; the bends and their rates are states too.
 """
 
 from __future__ import annotations
@@ -23,8 +25,10 @@ from pathlib import Path
 
 import casadi as ca
 
+from srs_opt.gait_opt.collocation.bending import bend_acceleration
 from srs_opt.gait_opt.collocation.curvature import periodic_curvature, time_constants
 from srs_opt.model.actuator import Actuator, ActuatorState
+from srs_opt.model.compliant import CompliantModel
 from srs_opt.model.mechanics import Mechanics
 from srs_opt.model.parameters import Structure
 from srs_opt.model.registry import build
@@ -81,10 +85,20 @@ class PointKind:
         return self.segments if self.relaxed else 2 * self.intervals * self.segments
 
     @property
+    def bends(self) -> int:
+        """Number of states of the bends, curvatures and their rates: none where they are prescribed."""
+        return 2 * self.segments if self.structure.compliant else 0
+
+    @property
+    def moving(self) -> int:
+        """Number of states of body and bends; those of the actuators follow."""
+        return BODY + self.bends
+
+    @property
     def states(self) -> int:
         """Number of states."""
         actuator = build(self.structure)[2]
-        return BODY + (0 if actuator.linear and not self.relaxed else actuator.states)
+        return self.moving + (0 if actuator.linear and not self.relaxed else actuator.states)
 
     @property
     def paths(self) -> int:
@@ -211,15 +225,22 @@ def _equations(kind: PointKind, s: _Symbols, p: ca.SX, closed: ca.SX) -> ca.SX:
     _, m, actuator = build(kind.structure)
     x = s.scale * s.x
     velocity, heading, ahead, aside = x[:3], x[3], x[4], x[5]
-    kappa, dkappa, deviation_rate = _shape(kind, actuator, s, closed, x[BODY:])
+    free, free_rate, deviation_rate = _shape(kind, actuator, s, closed, x[kind.moving :])
     body_rate, power = m.velocity_rate(ca.SX.zeros(3, 1), velocity)
     yaw_rate = m.yaw_rate(velocity[2])
     c, sn = ca.cos(heading), ca.sin(heading)
+    given = [(m.dkappa, free_rate), (m.kappa, free)]
+    bend_rates = ca.SX(0, 1)
+    if isinstance(m, CompliantModel):
+        kappa, dkappa = ca.vertsplit(x[BODY : kind.moving], kind.segments)
+        bend_rates = ca.vertcat(dkappa, bend_acceleration(m, velocity, heading))
+        given = [(m.no_load_rate, free_rate), (m.no_load, free), (m.dkappa, dkappa), (m.kappa, kappa)]
     rates = ca.vertcat(
         body_rate,
         yaw_rate - s.turn_rate,
         c * x[0] - sn * x[1] - s.speed + s.turn_rate * aside,
         sn * x[0] + c * x[1] - s.turn_rate * ahead,
+        bend_rates,
         deviation_rate,
     )
     duration = s.width / s.frequency
@@ -230,7 +251,7 @@ def _equations(kind: PointKind, s: _Symbols, p: ca.SX, closed: ca.SX) -> ca.SX:
     if kind.curvature:
         paths.append(m.kappa)
     out = ca.vertcat(duration * rates / s.scale, quadratures, *paths)
-    for old, new in ((m.dkappa, dkappa), (m.kappa, kappa)):
+    for old, new in given:
         out = ca.substitute(out, old, new)
     return _filled(kind, s, p, out)
 
@@ -239,7 +260,7 @@ def _equations(kind: PointKind, s: _Symbols, p: ca.SX, closed: ca.SX) -> ca.SX:
 def _sources() -> str:
     folder = Path(__file__).parent
     digest = hashlib.sha256()
-    for name in ("curvature.py", "point.py"):
+    for name in ("bending.py", "curvature.py", "point.py"):
         digest.update((folder / name).read_bytes())
     return digest.hexdigest()[:16]
 

@@ -1,0 +1,72 @@
+"""Gaits of soft bodies: bends are collocated, and the optimum holds when simulated from rest."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_collocation import ENDS, derivative_errors
+
+from srs_opt.gait import Wave, published_wave
+from srs_opt.gait_opt.collocation.guess import switches_of, unknowns_from_orbits
+from srs_opt.gait_opt.collocation.layout import Mesh
+from srs_opt.gait_opt.collocation.phases import phase_cuts, phase_times, switch_order
+from srs_opt.gait_opt.collocation.problem import CycleProblem
+from srs_opt.gait_opt.goal import Goal, Limits
+from srs_opt.gait_opt.ladder import Rung, climb
+from srs_opt.orbit.steady import steady_gait
+from srs_opt.robot import wpi_srs
+
+SOFT = wpi_srs().with_values(bending_stiffness_n_m2=0.005, friction_speed_m_s=0.001)
+
+
+def problem(robot, **changes):
+    return CycleProblem((robot,), "compliant", Goal(**changes), Limits())
+
+
+def test_derivatives_of_the_bends_equations():
+    short = SOFT.with_values(links=3, friction_speed_m_s=0.1)
+    gait = Wave(1.7, 47.0, (0.3, 1.5), (0.1, -0.2)).gait()
+    case, mesh = problem(short), Mesh.uniform(16)
+    p = case.program(16)
+    z, scales = unknowns_from_orbits(p.layout, [short], [steady_gait(short, gait)], mesh)
+    first, second = derivative_errors(p, z, case.parameters(p, mesh, scales, 0.1))
+    assert first < 1e-6
+    assert second < 1e-5
+
+
+def test_collocated_bends_converge_to_the_simulated_orbit():
+    smooth = replace(SOFT, friction_speed_m_s=0.03)
+    gait = Wave(1.9, 43.0, (0.0, 1.1, 2.18, 2.85), (0.0, 0.1, 0.0, 0.0)).gait()
+    orbit = steady_gait(smooth, gait)
+    switches = switches_of(gait, gait.intervals[0][0][0])
+    order = switch_order(switches)
+    errors = []
+    for elements in (12, 48):
+        mesh, times = phase_times(switches, order, phase_cuts(switches, order, ENDS, elements * ENDS))
+        case = problem(smooth, objective="turn", turn_rate_rad_s=orbit.turn_rate_rad_s)
+        p = case.program(mesh.elements, times)
+        z, scales = unknowns_from_orbits(p.layout, [smooth], [orbit], mesh)
+        (low, high), rows = case.bounds(p)
+        held = slice(0, 2 + p.layout.switches)
+        low[held] = high[held] = z[held]
+        turn = p.layout.unknown(0, "turn_rate")
+        low[turn], high[turn] = -10, 10
+        solution = p.solve(z, case.parameters(p, mesh, scales, 0.03), (low, high), rows)
+        assert solution.converged
+        errors.append(abs(solution.z[p.layout.unknown(0, "speed")] / orbit.speed_m_s - 1))
+        bends = solution.z[p.layout.states(0)].reshape(p.layout.points, -1)[:, 6:10] * scales[0][6:10]
+    assert errors[1] < 1e-4
+    assert errors[1] < errors[0] / 3
+    assert np.abs(bends).max() == pytest.approx(np.abs(orbit.kappa).max(), rel=0.02)
+
+
+def test_optimum_of_a_soft_body_from_the_published_gait():
+    """The best that a population search of another program knows at 0.005 N m^2 is 0.519 m/s."""
+    start = published_wave(SOFT, 2.0, 48.0).gait()
+    rungs = (*(Rung(v, n, 0.1, 4, quick=True) for v, n in ((0.1, 24), (0.03, 28), (0.01, 36))),
+             Rung(0.004, 50, 0.05, 1, quick=True))  # fmt: skip
+    found = climb(problem(SOFT), start, rungs)
+    assert found.score.total > 0.97 * 0.519
+    lags = np.diff([on for ((on, _),) in found.gait.intervals]) / found.gait.period_s % 1.0
+    tail, _, head = -2 * np.pi * (lags - 1)
+    assert tail > 1.0 > 0.75 > head  # softer bodies: longer at the tail, shorter at the head
