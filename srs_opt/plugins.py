@@ -1,15 +1,18 @@
 """Plugins: files that the command line names with --plugin, and entry points of installed packages.
 
-A plugin registers what it defines when it is run (`srs_opt.model.effects.register_effect`). A robot file may
-say which plugins it needs; loading it never runs one.
+A plugin registers what it defines when it is run (`srs_opt.model.effects.register_effect`,
+`srs_opt.gait_opt.objectives.registry.register_objective`). A robot file may say which plugins it needs;
+loading it never runs one.
 """
 
 from __future__ import annotations
 
+import hashlib
 import importlib.metadata
 import importlib.util
+import inspect
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -98,3 +101,39 @@ def entry_points(group: str) -> Iterator[tuple[str, Any]]:
             ) from error
         finally:
             _running.pop()
+
+
+def digest(functions: Iterable[Callable[..., Any]], *more: str) -> str:
+    """Return a hash that changes with the code of `functions` and with the files that define them."""
+    found = hashlib.sha256(" ".join(more).encode())
+    for function in functions:
+        found.update(b"hook")
+        code = getattr(function, "__code__", None)
+        if code is None:  # an object that can be called
+            found.update(repr(function).encode())
+            continue
+        constants = [c for c in code.co_consts if isinstance(c, (int, float, str, type(None)))]
+        enclosed = [cell.cell_contents for cell in function.__closure__ or ()]
+        found.update(code.co_code + repr((constants, enclosed) if enclosed else constants).encode())
+        source = inspect.getsourcefile(function)
+        if source and Path(source).is_file():
+            found.update(Path(source).read_bytes())
+    return found.hexdigest()[:16]
+
+
+def dumped(value: Any, functions: Iterable[Callable[..., Any]]) -> bytes:
+    """Return `value` pickled, its `functions` by value, for processes that cannot import them."""
+    import cloudpickle
+
+    modules = {getattr(function, "__module__", None) for function in functions}
+    by_value = [sys.modules[m] for m in modules if m in sys.modules and m.split(".")[0] not in _SHARED]
+    for module in by_value:
+        cloudpickle.register_pickle_by_value(module)
+    try:
+        return bytes(cloudpickle.dumps(value))
+    finally:
+        for module in by_value:
+            cloudpickle.unregister_pickle_by_value(module)
+
+
+_SHARED = ("__main__", "srs_opt", "planners", "casadi")  # main is by value anyway, the others are installed

@@ -37,10 +37,20 @@ def build_parser() -> Parser:
     )
     goal = parser.add_argument_group("what is wanted")
     goal.add_argument(
-        "--objective", choices=("speed", "transport", "turn", "slim"), default="speed",
-        help="fastest, least energy per weight and distance, best turn, slimmest swept band (default speed)",
+        "--objective", default="speed", metavar="NAME",
+        help="speed: fastest; transport: least energy per weight and distance; turn: tightest turn or, with "
+        "--radius or --turn-rate, the fastest such; pivot: most turn rate; slim: slimmest swept band; or one "
+        "that a --plugin defines (default speed)",
     )  # fmt: skip
-    goal.add_argument("--speed", type=positive_float, metavar="M_S", help="wanted speed, m/s")
+    goal.add_argument("--speed", type=positive_float, metavar="M_S", help="wanted (least) speed, m/s")
+    goal.add_argument(
+        "--least-speed", type=positive_float, metavar="M_S",
+        help="slowest gait to be taken, m/s (default 0.02 for transport, turn and slim, else none)",
+    )  # fmt: skip
+    goal.add_argument(
+        "--side", choices=("left", "right"), default="left",
+        help="where a tightest turn or a pivot goes (default left)",
+    )  # fmt: skip
     goal.add_argument("--radius", type=finite_float, metavar="M", help="wanted radius, m, + left")
     goal.add_argument(
         "--turn-rate", type=finite_float, metavar="RAD_S", help="wanted turn rate, rad/s, + left"
@@ -96,7 +106,10 @@ def problem_from(options: argparse.Namespace) -> CycleProblem:
     robots: list[Robot] = [load_robot(path) for path in options.robots or [options.robot]]
     if options.valve_delay is not None:
         robots = [r.with_values(valve_delay_s=options.valve_delay) for r in robots]
-    goal = Goal(options.objective, options.speed, options.radius, options.turn_rate, options.envelope)
+    goal = Goal(
+        options.objective, options.speed, options.radius, options.turn_rate, options.envelope,
+        options.least_speed, options.side,
+    )  # fmt: skip
     if options.intervals > 1 and options.valves != "free":
         raise InputError("--intervals goes with --valves free: a wave has one interval per segment and cycle")
     if options.intervals > MOST_INTERVALS:

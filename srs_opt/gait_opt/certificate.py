@@ -9,7 +9,8 @@ import numpy as np
 
 from srs_opt.gait import Gait
 from srs_opt.gait_opt.collocation.problem import CycleProblem
-from srs_opt.gait_opt.goal import Goal, Limits
+from srs_opt.gait_opt.goal import LEAST_TURN_RAD_S, STRAIGHT_RAD_S, TURN_ERROR, Goal, Limits
+from srs_opt.gait_opt.score import broken_constraints, evaluated, robot_scores
 from srs_opt.model.effects import all_effects
 from srs_opt.orbit.attractors import other_orbits
 from srs_opt.orbit.steady import Orbit, body_over_cycle, integrator, steady_gait
@@ -23,21 +24,24 @@ CYCLES = 50
 SPEED_ERROR = 0.005  # collocation against simulation
 SPEED_FLOOR_M_S = 5e-4  # of that difference, for gaits that hardly move
 GAP = 1e-3  # change of the motion over CYCLES cycles, over its size
-TURN_ERROR = 0.02
 STANDING_START = 0.01  # speed of the last of CYCLES cycles from rest against the steady one
 LIMIT_EXCESS = 0.01
-_STRAIGHT_RAD_S = 0.02
+CONSTRAINT_EXCESS = 0.01  # of an objective's own constraints
 
 
 @dataclass(frozen=True)
-class Certificate:
-    """What simulation says about a finished gait.
+class RobotCertificate:
+    """What simulation says about a finished gait on one robot.
 
     Attributes
     ----------
-    speed_m_s : float
-    relative_error : float
-        Speed that the optimizer claimed against the simulated one.
+    name : str
+    speed_m_s, turn_rate_rad_s : float
+    radius_m : float or None
+    band_m : float
+        Total width of the swept band.
+    claimed_m_s : float
+        Speed that the optimizer claimed.
     periodicity_gap : float
         Change of velocity and shape over 50 simulated cycles, over their size.
     largest_floquet_multiplier : float
@@ -46,21 +50,83 @@ class Certificate:
         Mean speed over the last of 50 cycles from rest.
     other_orbits_m_s : tuple of float
         Speeds of other stable orbits of the same gait, found from rolling starts (soft bodies can have some).
-    dwell_ok : bool
-    switches_per_s : float
     failures : tuple of str
         What is not as it should be, in words; empty when passed.
     """
 
+    name: str
     speed_m_s: float
-    relative_error: float
+    turn_rate_rad_s: float
+    radius_m: float | None
+    band_m: float
+    claimed_m_s: float
     periodicity_gap: float
     largest_floquet_multiplier: float
     standing_start_m_s: float
     other_orbits_m_s: tuple[float, ...]
+    failures: tuple[str, ...]
+
+    @property
+    def relative_error(self) -> float:
+        """Speed that the optimizer claimed against the simulated one."""
+        return abs(self.claimed_m_s - self.speed_m_s) / max(abs(self.speed_m_s), 1e-9)
+
+    def record(self) -> dict[str, Any]:
+        """Return the JSON object."""
+        return {
+            "name": self.name,
+            "speed_m_s": self.speed_m_s,
+            "turn_rate_rad_s": self.turn_rate_rad_s,
+            "radius_m": self.radius_m,
+            "band_m": self.band_m,
+            "relative_error": self.relative_error,
+            "periodicity_gap": self.periodicity_gap,
+            "largest_floquet_multiplier": self.largest_floquet_multiplier,
+            "standing_start_m_s": self.standing_start_m_s,
+            "other_orbits_m_s": list(self.other_orbits_m_s),
+            "passed": not self.failures,
+            "failures": list(self.failures),
+        }
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """What simulation says about a finished gait on every robot that it is for.
+
+    Attributes
+    ----------
+    robots : tuple of RobotCertificate
+        The nominal one first.
+    worst : int
+        The robot that serves the goal worst: its wishes missed most or, none missed, its merit lowest.
+    dwell_ok : bool
+    switches_per_s : float
+    common : tuple of str
+        What is wrong with the gait itself, whatever the robot.
+    """
+
+    robots: tuple[RobotCertificate, ...]
+    worst: int
     dwell_ok: bool
     switches_per_s: float
-    failures: tuple[str, ...] = field(default=())
+    common: tuple[str, ...] = field(default=())
+
+    @property
+    def speed_m_s(self) -> float:
+        """Simulated speed of the nominal robot."""
+        return self.robots[0].speed_m_s
+
+    @property
+    def worst_robot(self) -> RobotCertificate:
+        """The robot that serves the goal worst."""
+        return self.robots[self.worst]
+
+    @property
+    def failures(self) -> tuple[str, ...]:
+        """What is not as it should be, in words, the robots named where there are several."""
+        several = len(self.robots) > 1
+        own = [f"robot '{r.name}': {text}" if several else text for r in self.robots for text in r.failures]
+        return (*self.common, *own)
 
     @property
     def passed(self) -> bool:
@@ -68,14 +134,14 @@ class Certificate:
         return not self.failures
 
     def record(self) -> dict[str, Any]:
-        """Return the JSON object."""
+        """Return the JSON object: the largest of what should be small, over the robots."""
         return {
             "speed_m_s": self.speed_m_s,
-            "relative_error": self.relative_error,
-            "periodicity_gap": self.periodicity_gap,
-            "largest_floquet_multiplier": self.largest_floquet_multiplier,
-            "standing_start_m_s": self.standing_start_m_s,
-            "other_orbits_m_s": list(self.other_orbits_m_s),
+            "relative_error": max(r.relative_error for r in self.robots),
+            "periodicity_gap": max(r.periodicity_gap for r in self.robots),
+            "largest_floquet_multiplier": max(r.largest_floquet_multiplier for r in self.robots),
+            "standing_start_m_s": self.robots[0].standing_start_m_s,
+            "other_orbits_m_s": list(self.robots[0].other_orbits_m_s),
             "dwell_ok": self.dwell_ok,
             "switches_per_s": self.switches_per_s,
             "passed": self.passed,
@@ -83,18 +149,33 @@ class Certificate:
         }
 
 
-def certify(problem: CycleProblem, gait: Gait, claimed_m_s: float) -> tuple[Certificate, tuple[Orbit, ...]]:
-    """Return the certificate of a gait that stands on the controller's ticks, and its orbits per robot."""
+def certify(
+    problem: CycleProblem, gait: Gait, claimed_m_s: tuple[float, ...]
+) -> tuple[Certificate, tuple[Orbit, ...]]:
+    """Return the certificate of a gait that stands on the controller's ticks, and its orbits per robot.
+
+    `claimed_m_s` are the speeds that the optimizer says the robots make. Every check is made on every robot.
+    """
     orbits = tuple(steady_gait(r, gait, problem.model) for r in problem.robots)
-    orbit, robot = orbits[0], problem.robots[0]
-    speed = orbit.speed_m_s
-    error = abs(claimed_m_s - speed) / max(abs(speed), 1e-9)
-    gap = periodicity_gap(robot, gait, problem.model, orbit)
-    largest = max(o.largest_multiplier for o in orbits)
-    standing = standing_start(robot, gait, problem.model)
-    others = other_orbits(robot, orbit, problem.model)
     dwell = gait.shortest_dwell_s()
     dwell_ok = dwell >= problem.limits.min_dwell_s - 1e-9
+    common = []
+    if not dwell_ok:
+        common.append(f"a valve holds for {dwell:.4f} s, shorter than {problem.limits.min_dwell_s:.4f} s")
+    common += _ranges_left(problem.limits, gait)
+    robots = tuple(_certified(problem, gait, r, o, claimed_m_s[r]) for r, o in enumerate(orbits))
+    scores = robot_scores(problem, gait, orbits)
+    worst = min(range(len(robots)), key=lambda r: (not robots[r].failures, scores[r].total))
+    return Certificate(robots, worst, dwell_ok, gait.switches_per_s, tuple(common)), orbits
+
+
+def _certified(
+    problem: CycleProblem, gait: Gait, index: int, orbit: Orbit, claimed_m_s: float
+) -> RobotCertificate:
+    robot = problem.robots[index]
+    speed, largest = orbit.speed_m_s, orbit.largest_multiplier
+    gap = periodicity_gap(robot, gait, problem.model, orbit)
+    standing = standing_start(robot, gait, problem.model)
     failures = []
     if abs(claimed_m_s - speed) > max(SPEED_ERROR * abs(speed), SPEED_FLOOR_M_S):
         failures.append(f"simulated speed {speed:.4f} m/s, the optimizer's {claimed_m_s:.4f} m/s")
@@ -106,25 +187,21 @@ def certify(problem: CycleProblem, gait: Gait, claimed_m_s: float) -> tuple[Cert
         )
     if largest >= 1:
         failures.append(f"the gait is unstable: largest Floquet multiplier {largest:.3f}")
-    if not dwell_ok:
-        failures.append(f"a valve holds for {dwell:.4f} s, shorter than {problem.limits.min_dwell_s:.4f} s")
-    failures += _limits_broken(problem.limits, gait, orbits)
+    failures += _curvature_exceeded(problem.limits, orbit)
     failures += _wishes_missed(problem.goal, orbit)
-    for r, o in zip(problem.robots, orbits):
-        if (room := self_clearance_m(r, o, problem.model)) < 0:
-            failures.append(f"the body of robot '{r.name}' overlaps itself by {-1e3 * room:.1f} mm")
-    certificate = Certificate(
-        speed,
-        error,
-        gap,
-        largest,
-        standing,
-        tuple(o.speed_m_s for o in others),
-        dwell_ok,
-        gait.switches_per_s,
-        tuple(failures),
-    )
-    return certificate, orbits
+    _, rows = evaluated(problem, problem.goal.aim, gait, index, orbit)
+    failures += [
+        f"constraint {name} is missed by {over:.4g}"
+        for name, over in broken_constraints(problem, rows)
+        if not over <= CONSTRAINT_EXCESS
+    ]
+    if (room := self_clearance_m(robot, orbit, problem.model)) < 0:
+        failures.append(f"the body overlaps itself by {-1e3 * room:.1f} mm")
+    others = other_orbits(robot, orbit, problem.model)
+    return RobotCertificate(
+        robot.name, speed, orbit.turn_rate_rad_s, orbit.radius_m, sum(orbit.envelope_m), claimed_m_s, gap,
+        largest, standing, tuple(o.speed_m_s for o in others), tuple(failures),
+    )  # fmt: skip
 
 
 def standing_start(robot: Robot, gait: Gait, model: str, cycles: int = CYCLES) -> float:
@@ -154,43 +231,52 @@ def periodicity_gap(robot: Robot, gait: Gait, model: str, orbit: Orbit, cycles: 
     return float(max(*body, shape))
 
 
-def _limits_broken(limits: Limits, gait: Gait, orbits: tuple[Orbit, ...]) -> list[str]:
-    broken = []
-    for name, value, (low, high), unit in (
-        ("frequency", gait.frequency_hz, limits.frequency_hz, "Hz"),
-        ("pressure", gait.pressure_kpa, limits.pressure_kpa, "kPa"),
-    ):
-        if not low * (1 - 2e-3) <= value <= high * (1 + 2e-3):
-            broken.append(f"{name} {value:.3f} {unit} is outside {low:g} ... {high:g}")
-    most = limits.max_curvature_1_m
-    bend = max(float(np.abs(o.kappa).max()) for o in orbits)
-    if most is not None and bend > most * (1 + LIMIT_EXCESS):
-        broken.append(f"curvature reaches {bend:.2f} 1/m, limit {most:g}")
-    return broken
+def _ranges_left(limits: Limits, gait: Gait) -> list[str]:
+    return [
+        f"{name} {value:.3f} {unit} is outside {low:g} ... {high:g}"
+        for name, value, (low, high), unit in (
+            ("frequency", gait.frequency_hz, limits.frequency_hz, "Hz"),
+            ("pressure", gait.pressure_kpa, limits.pressure_kpa, "kPa"),
+        )
+        if not low * (1 - 2e-3) <= value <= high * (1 + 2e-3)
+    ]
+
+
+def _curvature_exceeded(limits: Limits, orbit: Orbit) -> list[str]:
+    most, bend = limits.max_curvature_1_m, float(np.abs(orbit.kappa).max())
+    if most is None or bend <= most * (1 + LIMIT_EXCESS):
+        return []
+    return [f"curvature reaches {bend:.2f} 1/m, limit {most:g}"]
 
 
 def _wishes_missed(goal: Goal, orbit: Orbit) -> list[str]:
     missed = []
-    turn = orbit.turn_rate_rad_s
+    floor = goal.floor_m_s
     if goal.envelope_m is not None and sum(orbit.envelope_m) > goal.envelope_m * (1 + LIMIT_EXCESS):
         missed.append(f"the swept band is {sum(orbit.envelope_m):.4f} m wide, limit {goal.envelope_m:g} m")
-    if goal.radius_m is not None:
-        radius = orbit.radius_m
-        if radius is None or abs(radius - goal.radius_m) > TURN_ERROR * abs(goal.radius_m):
-            found = "none (straight)" if radius is None else f"{radius:.4f} m"
-            missed.append(f"wanted radius {goal.radius_m:g} m, simulated {found}")
-    elif goal.turn_rate_rad_s is not None:
-        if abs(turn - goal.turn_rate_rad_s) > max(TURN_ERROR * abs(goal.turn_rate_rad_s), _STRAIGHT_RAD_S):
-            missed.append(f"wanted turn rate {goal.turn_rate_rad_s:g} rad/s, simulated {turn:.3f}")
-    elif not goal.tightest and abs(turn) > _STRAIGHT_RAD_S:
-        missed.append(f"the gait should run straight but turns at {turn:.3f} rad/s")
-    if (
-        goal.speed_m_s
-        and goal.objective != "speed"
-        and orbit.speed_m_s < goal.speed_m_s * (1 - SPEED_ERROR * 2)
-    ):
-        missed.append(f"wanted speed {goal.speed_m_s:g} m/s, simulated {orbit.speed_m_s:.4f} m/s")
+    missed += _turn_missed(goal, orbit)
+    if floor is not None and orbit.speed_m_s < floor * (1 - SPEED_ERROR * 2):
+        wanted = "wanted" if goal.speed_m_s else "least"
+        missed.append(f"{wanted} speed {floor:g} m/s, simulated {orbit.speed_m_s:.4f} m/s")
     return missed
+
+
+def _turn_missed(goal: Goal, orbit: Orbit) -> list[str]:
+    turn, radius = orbit.turn_rate_rad_s, orbit.radius_m
+    if goal.radius_m is not None:
+        if radius is not None and abs(radius - goal.radius_m) <= TURN_ERROR * abs(goal.radius_m):
+            return []
+        found = "none (straight)" if radius is None else f"{radius:.4f} m"
+        return [f"wanted radius {goal.radius_m:g} m, simulated {found}"]
+    if goal.turn_rate_rad_s is not None:
+        if abs(turn - goal.turn_rate_rad_s) <= max(TURN_ERROR * abs(goal.turn_rate_rad_s), STRAIGHT_RAD_S):
+            return []
+        return [f"wanted turn rate {goal.turn_rate_rad_s:g} rad/s, simulated {turn:.3f}"]
+    if goal.turn == "side" and goal.sense * turn < LEAST_TURN_RAD_S * (1 - TURN_ERROR):
+        return [f"the gait should turn {goal.side} but turns at {turn:+.3f} rad/s (+ is left)"]
+    if goal.turn == "straight" and abs(turn) > STRAIGHT_RAD_S:
+        return [f"the gait should run straight but turns at {turn:.3f} rad/s"]
+    return []
 
 
 def self_clearance_m(robot: Robot, orbit: Orbit, model: str | None = None) -> float:

@@ -13,7 +13,7 @@ from srs_opt.gait import Gait, published_wave
 from srs_opt.gait_opt.aim import end_for_end, in_step
 from srs_opt.gait_opt.collocation.problem import CycleProblem
 from srs_opt.gait_opt.finish import finished
-from srs_opt.gait_opt.goal import Goal, Limits
+from srs_opt.gait_opt.goal import LEAST_SPEED_M_S, STRAIGHT_RAD_S, Goal, Limits
 from srs_opt.gait_opt.ladder import Climb, Rung, climb, ladder
 from srs_opt.gait_opt.score import score
 from srs_opt.gait_opt.starts import best_start, plain_waves
@@ -26,8 +26,6 @@ from srs_opt.sweep import Resume, sweep
 TABLE_PRESSURE_KPA = (20.0, 55.0)
 _BAND_EXCESS = 0.01
 _RADIUS_ERROR = 0.03
-_STRAIGHT_RAD_S = 0.02
-_LEAST_SPEED_M_S = 0.02
 
 
 @dataclass(frozen=True)
@@ -114,14 +112,14 @@ def _fulfil(work: Work, task: Task) -> dict[str, Any]:
 
 def _kept(wish: Wish, entry: TableGait) -> bool:
     """Whether a gait is what was wished for, near enough."""
-    if entry.speed_m_s < _LEAST_SPEED_M_S:
+    if entry.speed_m_s < LEAST_SPEED_M_S:
         return False
     if wish.load:  # asked for under load: without, it is what it is
-        return (wish.radius_m is None) == (abs(entry.turn_rate_rad_s) < _STRAIGHT_RAD_S)
+        return (wish.radius_m is None) == (abs(entry.turn_rate_rad_s) < STRAIGHT_RAD_S)
     if wish.band_m is not None and sum(entry.envelope_m) > wish.band_m * (1 + _BAND_EXCESS):
         return False
     if wish.radius_m is None:
-        return entry.radius_m is None or abs(entry.turn_rate_rad_s) < _STRAIGHT_RAD_S
+        return entry.radius_m is None or abs(entry.turn_rate_rad_s) < STRAIGHT_RAD_S
     return entry.radius_m is not None and abs(entry.radius_m / wish.radius_m - 1) < _RADIUS_ERROR
 
 
@@ -162,7 +160,7 @@ def images(robot: Robot, model: str, name: str, gait: Gait, tick_s: float) -> li
         return steady_gait(robot, in_step(image, tick_s), model)
 
     forward, backward = orbit(gait), orbit(end_for_end(gait))
-    straight = abs(forward.turn_rate_rad_s) < _STRAIGHT_RAD_S
+    straight = abs(forward.turn_rate_rad_s) < STRAIGHT_RAD_S
     made: list[tuple[str, Orbit]] = [(name if straight else f"{name} left", forward)]
     if not straight:
         made.append((f"{name} right", orbit(gait.mirrored())))

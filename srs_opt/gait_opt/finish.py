@@ -60,13 +60,13 @@ def finished(problem: CycleProblem, gait: Gait) -> Gait:
     goal, limits = problem.goal, problem.limits
     exact = gait
     gait = on_ticks(exact, limits.tick_s, limits.frequency_hz)
-    straight = goal.radius_m is None and not goal.turn_rate_rad_s and not goal.tightest
+    straight = goal.turn == "straight" or goal.turn_rate_rad_s == 0
     if straight and all(len(pairs) == 1 for pairs in gait.intervals):
         even = on_ticks(evened(exact), limits.tick_s, limits.frequency_hz)
         as_found = _score(problem, gait)
         if _score(problem, even).total > as_found.total - _LOST * as_found.scale:
             return even
-    if goal.tightest:
+    if goal.turn in ("side", "any"):
         return gait
     return on_ticks(aimed(gait, turn_miss(problem), _TURN_RAD_S, 0.1), limits.tick_s, limits.frequency_hz)
 

@@ -4,11 +4,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 from srs_opt.errors import InputError
+from srs_opt.gait_opt.objectives.objective import Objective
+from srs_opt.gait_opt.objectives.registry import objective_named
 from srs_opt.robot import Robot
 
-OBJECTIVES = ("speed", "transport", "turn", "slim")
+LEAST_SPEED_M_S = 0.02  # of gaits whose objective alone would bring them to a stop
+LEAST_TURN_RAD_S = 0.05  # of a turn whose side is wanted and nothing else
+TURN_ERROR = 0.02  # share by which a wanted radius or turn rate may be missed
+STRAIGHT_RAD_S = 0.02  # turn rate below which a gait counts as straight
+SIDES = {"left": 1.0, "right": -1.0}
 CHAMBER_OVER_WIDTH = 1 / 6  # assumed diameter of an air chamber over the body's width
 
 
@@ -18,50 +25,102 @@ class Goal:
 
     Attributes
     ----------
-    objective : {"speed", "transport", "turn", "slim"}
-        Fastest; least energy per weight and distance; tightest (or, with a radius or turn rate, fastest)
-        turn; smallest total width of the swept band.
+    objective : Objective or str
+        One of one's own, or the name of a built-in or registered one: fastest (`speed`); least energy per
+        weight and distance (`transport`); tightest (or, with a radius or turn rate, fastest) turn (`turn`);
+        most turn rate (`pivot`); smallest total width of the swept band (`slim`).
     speed_m_s : float, optional
-        Wanted speed (least speed for transport, turn and slim); negative backwards.
+        Wanted speed: the least one for transport, turn and slim. A search for it asks first whether the
+        fastest gait makes it.
     radius_m, turn_rate_rad_s : float, optional
-        Wanted turn, + left. Without either the gait runs straight.
+        Wanted turn, + left. Without either the gait runs straight, where the objective does not turn.
     envelope_m : float, optional
         Largest total width of the swept band, body width included.
+    least_speed_m_s : float, optional
+        Speed below which no gait is taken; without, 0.02 m/s for objectives that would otherwise bring the
+        robot to a stop (transport, turn, slim), none for the others.
+    side : {"left", "right"}
+        Where turns without a wanted radius or turn rate (tightest, pivot) go.
     """
 
-    objective: str = "speed"
+    objective: Objective | str = "speed"
     speed_m_s: float | None = None
     radius_m: float | None = None
     turn_rate_rad_s: float | None = None
     envelope_m: float | None = None
+    least_speed_m_s: float | None = None
+    side: str = "left"
 
     def __post_init__(self) -> None:
-        if self.objective not in OBJECTIVES:
-            raise InputError(f"objective must be one of {', '.join(OBJECTIVES)}, found '{self.objective}'")
-        if self.objective == "slim" and not self.speed_m_s:
-            raise InputError("objective slim needs a wanted speed: --speed M_S")
-        if self.objective == "speed" and self.speed_m_s is not None:
+        if isinstance(self.objective, str):  # kept as the object: other processes need not know its name
+            object.__setattr__(self, "objective", objective_named(self.objective))
+        aim = self.aim
+        if aim.needs_speed and not self.speed_m_s:
+            raise InputError(f"objective {aim.name} needs a wanted speed: --speed M_S")
+        if not aim.least_speed and self.speed_m_s is not None:
             raise InputError(
-                "--speed has no meaning for objective speed, which takes all that it gets; ask for slim, "
-                "transport or turn at that speed"
+                f"--speed has no meaning for objective {aim.name}, which takes all that it gets; ask for "
+                "slim, transport or turn at that speed, or give a --least-speed"
             )
         if self.radius_m is not None and self.radius_m == 0:
-            raise InputError("a wanted radius must not be zero")
+            raise InputError("a wanted radius must not be zero; --objective pivot turns about one place")
         if self.radius_m is not None and self.turn_rate_rad_s is not None:
             raise InputError("give a radius or a turn rate, not both")
+        if self.wants_turn and aim.turn == "side":
+            raise InputError(
+                f"objective {aim.name} chooses its turn itself: without --radius and --turn-rate"
+            )
         if self.speed_m_s is not None and self.speed_m_s < 0:
             raise InputError("a wanted speed must be above zero; --table also holds the gaits backwards")
+        if self.least_speed_m_s is not None and not 0 < self.least_speed_m_s < math.inf:
+            raise InputError(f"the least speed must be above 0 m/s, found {self.least_speed_m_s:g}")
+        if self.side not in SIDES:
+            raise InputError(f"side must be left or right, found '{self.side}'")
+
+    @property
+    def aim(self) -> Objective:
+        """The objective that counts for what is wanted."""
+        objective = self.objective
+        assert not isinstance(objective, str)
+        return objective if self.wants_turn or objective.unless_turn is None else objective.unless_turn
+
+    @property
+    def name(self) -> str:
+        """The objective's name, as it was asked for."""
+        objective = self.objective
+        assert not isinstance(objective, str)
+        return objective.name
+
+    @property
+    def wants_turn(self) -> bool:
+        """Whether a certain radius or turn rate is wanted."""
+        return self.radius_m is not None or self.turn_rate_rad_s is not None
+
+    @property
+    def turn(self) -> str:
+        """Return "radius" or "rate" where one is wanted, else what the objective asks: one of `TURNS`."""
+        if self.radius_m is not None:
+            return "radius"
+        return "rate" if self.turn_rate_rad_s is not None else self.aim.turn
+
+    @property
+    def sense(self) -> float:
+        """+1 where turns should go left, -1 right."""
+        return SIDES[self.side]
+
+    @property
+    def floor_m_s(self) -> float | None:
+        """Speed that a gait must have at least; None: any."""
+        if self.speed_m_s:
+            return self.speed_m_s
+        if self.least_speed_m_s is None and self.aim.least_speed:
+            return LEAST_SPEED_M_S
+        return self.least_speed_m_s
 
     @property
     def only_fast(self) -> bool:
         """Whether nothing is wanted but speed straight ahead."""
-        wishes = (self.radius_m, self.turn_rate_rad_s, self.envelope_m)
-        return self.objective == "speed" and all(w is None for w in wishes)
-
-    @property
-    def tightest(self) -> bool:
-        """Whether the smallest radius is sought."""
-        return self.objective == "turn" and self.radius_m is None and self.turn_rate_rad_s is None
+        return self.aim.quick and self.turn == "straight" and self.envelope_m is None
 
 
 @dataclass(frozen=True)
@@ -119,15 +178,10 @@ def chamber_volume_m3(robot: Robot) -> float:
     return math.pi / 4 * bore**2 * robot.segment_length_m
 
 
-def air_work_j(intervals: int, pressure_kpa: float, volume_m3: float) -> float:
+def air_work_j(intervals: int, pressure_kpa: Any, volume_m3: Any) -> Any:
     """Return the energy of a cycle's air, J: every switch fills one chamber, at volume x pressure.
 
     `intervals` counts on-intervals of all segments; each begins with a fill on the left and ends with one
-    on the right.
+    on the right. Numbers or expressions, like pressure and volume.
     """
-    return 2 * intervals * volume_m3 * pressure_kpa * 1e3
-
-
-def cost_of_transport(friction_j: float, air_j: float, distance_m: float, weight_n: float) -> float:
-    """Return (friction work + air) / (weight x distance), all per cycle; no unit."""
-    return (friction_j + air_j) / (weight_n * distance_m)
+    return 2e3 * intervals * volume_m3 * pressure_kpa

@@ -241,7 +241,7 @@ def solve_from(
     parameters = problem.parameters(p, mesh, scales, rung.friction_speed_m_s, worth.scale)
     z[p.layout.merit] = worth.merit / worth.scale
     unknowns, rows, binding = bounded(problem, p, z, reach)
-    options = _QUICK if rung.quick else _ROAMING if problem.goal.tightest else _PATIENT
+    options = _QUICK if rung.quick else _ROAMING if problem.goal.turn == "side" else _PATIENT
     solution = p.solve(z, parameters, unknowns, rows, options=options)
     return solution, p, binding(solution.z)
 

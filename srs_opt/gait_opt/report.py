@@ -9,7 +9,7 @@ from srs_opt.gait import Gait, published_wave
 from srs_opt.gait_opt.collocation.problem import CycleProblem
 from srs_opt.gait_opt.score import transport_cost
 from srs_opt.gait_opt.search import Found
-from srs_opt.orbit.steady import Orbit, steady_gait
+from srs_opt.orbit.steady import steady_gait
 
 
 def wave_parameters(gait: Gait) -> tuple[list[float], list[float]] | None:
@@ -55,7 +55,7 @@ def record(problem: CycleProblem, found: Found, solve_s: float, compile_s: float
     gait, orbit = found.gait, found.orbits[0]
     wave = wave_parameters(gait)
     return {
-        "objective": problem.goal.objective,
+        "objective": problem.goal.name,
         "speed_m_s": orbit.speed_m_s,
         "turn_rate_rad_s": orbit.turn_rate_rad_s,
         "radius_m": orbit.radius_m,
@@ -66,7 +66,8 @@ def record(problem: CycleProblem, found: Found, solve_s: float, compile_s: float
         "phase_rad": None if wave is None else wave[0],
         "offset": None if wave is None else wave[1],
         "switches": switches(gait),
-        "robots": [_motion(r.name, o) for r, o in zip(problem.robots, found.orbits)],
+        "robots": [r.record() for r in found.certificate.robots],
+        "worst_robot": found.certificate.worst_robot.name,
         "baseline": baseline(problem),
         "certificate": found.certificate.record(),
         "starts": len(found.merits),
@@ -76,10 +77,6 @@ def record(problem: CycleProblem, found: Found, solve_s: float, compile_s: float
         "solve_s": solve_s,
         "compile_s": compile_s,
     }
-
-
-def _motion(name: str, orbit: Orbit) -> dict[str, Any]:
-    return {"robot": name, "speed_m_s": orbit.speed_m_s, "turn_rate_rad_s": orbit.turn_rate_rad_s}
 
 
 def summary(answer: dict[str, Any]) -> str:
@@ -101,6 +98,7 @@ def summary(answer: dict[str, Any]) -> str:
         f"gap after 50 cycles {certificate['periodicity_gap']:.1e}, "
         f"largest Floquet multiplier {certificate['largest_floquet_multiplier']:.2f}",
         *_others(certificate),
+        *_worst(answer),
     ]
     lines += [f"  {failure}" for failure in certificate["failures"]]
     if answer["interrupted"]:
@@ -112,3 +110,16 @@ def _others(certificate: dict[str, Any]) -> list[str]:
     """Say that the speed depends on how the gait is begun, where it does."""
     speeds = ", ".join(f"{speed:.4f}" for speed in certificate["other_orbits_m_s"])
     return [f"  from rest; begun while rolling this gait can also run at {speeds} m/s"] if speeds else []
+
+
+def _worst(answer: dict[str, Any]) -> list[str]:
+    """Say which of several robots serves the goal worst, and how."""
+    robots = answer["robots"]
+    if len(robots) < 2:
+        return []
+    worst = next(r for r in robots if r["name"] == answer["worst_robot"])
+    radius = "straight" if worst["radius_m"] is None else f"radius {worst['radius_m']:+.3f} m"
+    return [
+        f"  worst of {len(robots)} robots: '{worst['name']}', {worst['speed_m_s']:.4f} m/s, {radius}, "
+        f"band {worst['band_m']:.4f} m"
+    ]

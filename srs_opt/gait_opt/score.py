@@ -7,9 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from srs_opt.gait import Gait
-from srs_opt.gait_opt.collocation.layout import ENVELOPE_UNIT_M
+from srs_opt.gait_opt.collocation.guess import switches_of
 from srs_opt.gait_opt.collocation.problem import CycleProblem, weight_n
-from srs_opt.gait_opt.goal import air_work_j, cost_of_transport
+from srs_opt.gait_opt.goal import LEAST_TURN_RAD_S, Goal, air_work_j
+from srs_opt.gait_opt.objectives.built_in import TRANSPORT
+from srs_opt.gait_opt.objectives.cycle import SAMPLES
+from srs_opt.gait_opt.objectives.objective import Objective, formulas
 from srs_opt.orbit.steady import Orbit
 
 _PENALTY = 5.0
@@ -37,46 +40,62 @@ class Score:
 
 
 def score(problem: CycleProblem, gait: Gait, orbits: tuple[Orbit, ...]) -> Score:
-    """Return the score of a gait from its simulated orbits, one per robot."""
-    merits = [_merit(problem, gait, k, o) for k, o in enumerate(orbits)]
-    return Score(min(merits), max(_miss(problem, orbits[0]), *(_limits_miss(problem, o) for o in orbits)))
+    """Return the score of a gait from its simulated orbits, one per robot: worst merit, worst miss."""
+    each = robot_scores(problem, gait, orbits)
+    return Score(min(s.merit for s in each), max(s.miss for s in each))
+
+
+def robot_scores(problem: CycleProblem, gait: Gait, orbits: tuple[Orbit, ...]) -> tuple[Score, ...]:
+    """Return the score of every robot."""
+    found = []
+    for r, orbit in enumerate(orbits):
+        merit, rows = evaluated(problem, problem.goal.aim, gait, r, orbit)
+        own = sum(over for _, over in broken_constraints(problem, rows))
+        found.append(Score(merit, _miss(problem.goal, orbit) + _limits_miss(problem, orbit) + own))
+    return tuple(found)
+
+
+def evaluated(
+    problem: CycleProblem, objective: Objective, gait: Gait, robot: int, orbit: Orbit
+) -> tuple[float, np.ndarray]:
+    """Return merit and constraints of an objective for a simulated gait of one of the robots."""
+    limits = problem.limits.for_robot(problem.robots[0])
+    air = air_work_j(sum(map(len, gait.intervals)), gait.pressure_kpa, limits.chamber_volume_m3)
+    right, left = orbit.envelope_m
+    motion = (orbit.speed_m_s, orbit.turn_rate_rad_s, orbit.work_j, air, left, right)
+    scalars = np.array([*motion, gait.frequency_hz, gait.pressure_kpa, weight_n(problem.robots[robot])])
+    first_s = gait.intervals[0][0][0]
+    aim = formulas(objective, gait.segments, len(gait.intervals[0]))
+    curvature = np.zeros((gait.segments, SAMPLES))
+    if aim.uses_curvature:
+        at = (first_s + np.arange(SAMPLES) / SAMPLES * gait.period_s) % gait.period_s
+        curvature = np.stack([np.interp(at, orbit.time_s, row) for row in orbit.kappa.T])
+    return aim(scalars, switches_of(gait, first_s), curvature)
+
+
+def broken_constraints(problem: CycleProblem, rows: np.ndarray) -> list[tuple[str, float]]:
+    """Return name and excess of the objective's own constraints that do not hold."""
+    own = problem.formulas
+    over = np.maximum(np.maximum(own.low - rows, rows - own.high), 0.0)
+    return [(name, float(v)) for name, v in zip(own.names, over) if not v <= 0.0]
 
 
 def transport_cost(problem: CycleProblem, gait: Gait, robot: int, orbit: Orbit) -> float:
     """Return the cost of transport of a simulated gait."""
-    limits = problem.limits.for_robot(problem.robots[0])
-    intervals = sum(map(len, gait.intervals))
-    air = air_work_j(intervals, gait.pressure_kpa, limits.chamber_volume_m3 or 0.0)
-    distance = max(abs(orbit.speed_m_s) * gait.period_s, 1e-9)
-    return cost_of_transport(orbit.work_j, air, distance, weight_n(problem.robots[robot]))
+    return -evaluated(problem, TRANSPORT, gait, robot, orbit)[0]
 
 
-def _merit(problem: CycleProblem, gait: Gait, robot: int, orbit: Orbit) -> float:
-    goal = problem.goal
-    if goal.objective == "transport":
-        return -transport_cost(problem, gait, robot, orbit)
-    if goal.objective == "slim":
-        return -sum(orbit.envelope_m) / ENVELOPE_UNIT_M
-    if goal.tightest:
-        radius = orbit.radius_m
-        return -10 * (1e3 if radius is None else radius)
-    return orbit.speed_m_s
-
-
-def _miss(problem: CycleProblem, orbit: Orbit) -> float:
-    """Return by how much the nominal robot misses speed and turn, as shares of a typical motion."""
-    goal = problem.goal
-    wanted_turn = goal.turn_rate_rad_s
+def _miss(goal: Goal, orbit: Orbit) -> float:
+    """Return by how much a robot misses speed and turn, as shares of a typical motion."""
+    turn, floor = orbit.turn_rate_rad_s, goal.floor_m_s
     missed = 0.0
-    if goal.radius_m is not None:
-        wanted_turn = orbit.speed_m_s / goal.radius_m
-    elif wanted_turn is None and not goal.tightest:
-        wanted_turn = 0.0
-    if wanted_turn is not None:
-        missed += _LEVER_M * abs(orbit.turn_rate_rad_s - wanted_turn)
-    if goal.speed_m_s and goal.objective != "speed":
-        missed += max(goal.speed_m_s - orbit.speed_m_s, 0.0)
-    return missed
+    if goal.turn == "side":
+        missed += _LEVER_M * max(LEAST_TURN_RAD_S - goal.sense * turn, 0.0)
+    elif goal.radius_m is not None:
+        missed += _LEVER_M * abs(turn - orbit.speed_m_s / goal.radius_m)
+    elif goal.turn != "any":
+        missed += _LEVER_M * abs(turn - (goal.turn_rate_rad_s or 0.0))
+    return missed if floor is None else missed + max(1 - orbit.speed_m_s / floor, 0.0)
 
 
 def _limits_miss(problem: CycleProblem, orbit: Orbit) -> float:

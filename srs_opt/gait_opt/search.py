@@ -112,6 +112,12 @@ def search(
         lower, upper = rungs[:cut], rungs[cut:]
         reach = _EXACT_REACH
     else:
+        if (
+            problem.goal.turn == "side"
+            and problem.goal.sense * orbits_of(problem, warm)[0].turn_rate_rad_s < 0
+        ):
+            say(f"the earlier gait turns away from the {problem.goal.side}: its mirror image is taken")
+            warm = warm.mirrored()
         candidates, lower = [steered(problem, within(problem.limits, warm))], ()
         near = candidates[0] == warm and score(problem, warm, orbits_of(problem, warm)).miss < _KEPT
         upper = () if near else (replace(_MOVED, friction_speed_m_s=max(own, _MOVED.friction_speed_m_s)),)
@@ -151,14 +157,16 @@ def _refuse_out_of_reach(
     problem: CycleProblem, speed_m_s: float, starts: int, seed: int, say: Say, where: Where
 ) -> None:
     """Refuse a speed that even the fastest straight gait does not make, before the long search for it."""
-    only_fast = replace(problem, robots=problem.robots[:1], goal=Goal("speed"))
+    only_fast = replace(problem, goal=Goal("speed"))
     fastest = search(only_fast, starts, seed, say, where=where)
     if fastest.interrupted:
         raise KeyboardInterrupt
-    if speed_m_s > (1 + _BEYOND) * fastest.certificate.speed_m_s:
+    slowest = min(fastest.certificate.robots, key=lambda r: r.speed_m_s)
+    if speed_m_s > (1 + _BEYOND) * slowest.speed_m_s:
+        who = f" with robot '{slowest.name}'" if len(problem.robots) > 1 else ""
         raise NoAnswerError(
-            f"no gait makes {speed_m_s:g} m/s: the fastest that was found within these limits runs at "
-            f"{fastest.certificate.speed_m_s:.3f} m/s; ask for less, or widen --pressure or --frequency"
+            f"no gait makes {speed_m_s:g} m/s{who}: the fastest that was found within these limits runs at "
+            f"{slowest.speed_m_s:.3f} m/s; ask for less, or widen --pressure or --frequency"
         )
 
 

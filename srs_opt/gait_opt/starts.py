@@ -20,6 +20,7 @@ from srs_opt.orbit.steady import steady_gait
 
 _SMOOTHED_M_S = 0.1
 _AIM_RAD_S = 0.02
+_STEERED_RAD_S = 0.5  # turn rate from which searches for tight turns and pivots start
 _PRESSURE_SHARES, _WAVES_ON_BODY = (0.45, 0.55, 0.7, 0.85, 1.0), (0.7, 0.85)
 
 
@@ -50,8 +51,9 @@ def steered(problem: CycleProblem, gait: Gait) -> Gait:
     """Return the gait leaned towards the wanted turn, as far as smoothed friction lets it."""
     goal = problem.goal
     robot = replace(problem.robots[0], friction_speed_m_s=_SMOOTHED_M_S)
-    if goal.tightest:
-        return aimed(gait, lambda g: steady_gait(robot, g, problem.model).turn_rate_rad_s - 0.5, 0.1)
+    if goal.turn == "side":
+        turn = goal.sense * _STEERED_RAD_S
+        return aimed(gait, lambda g: steady_gait(robot, g, problem.model).turn_rate_rad_s - turn, 0.1)
     if goal.radius_m is None and not goal.turn_rate_rad_s:
         return gait
     try:

@@ -32,12 +32,12 @@ _TOLERATED_LOSS = 1e-3
 
 @dataclass(frozen=True)
 class Polished:
-    """The result: gait, its orbits and score, the speed that the last good solve claimed, the steps."""
+    """The result: gait, its orbits and score, the robots' speeds by the last good solve, the steps."""
 
     gait: Gait
     orbits: tuple[Orbit, ...]
     score: Score
-    claimed_m_s: float
+    claimed_m_s: tuple[float, ...]
     steps: tuple[Step, ...]
 
 
@@ -53,12 +53,12 @@ def optimize_switch_times(
     """
     orbits = orbits_of(problem, gait)
     best = score(problem, gait, orbits)
-    claimed = orbits[0].speed_m_s
+    claimed = tuple(o.speed_m_s for o in orbits)
     steps: list[Step] = []
     order = switch_order(_switches(gait))
     cuts = phase_cuts(_switches(gait), order, *elements_until(orbits, _ELEMENTS))
     for _ in range(_ROUNDS):
-        trial, step, met, finer, binding = _solve(problem, gait, orbits, order, cuts, reach)
+        trial, step, speeds, met, finer, binding = _solve(problem, gait, orbits, order, cuts, reach)
         try:
             trial_orbits = orbits_of(problem, trial)
         except NoAnswerError:
@@ -69,7 +69,7 @@ def optimize_switch_times(
         steps.append(step)
         gain = found.total - best.total
         if not step.trouble and gain > -_TOLERATED_LOSS * best.scale:
-            claimed = step.speed_m_s
+            claimed = speeds
         if gain > 0:
             gait, orbits, best = trial, trial_orbits, found
         if report is not None:
@@ -99,12 +99,13 @@ def _solve(
     order: np.ndarray,
     cuts: Cuts,
     reach: float,
-) -> tuple[Gait, Step, np.ndarray | None, Cuts, bool]:
+) -> tuple[Gait, Step, tuple[float, ...], np.ndarray | None, Cuts, bool]:
     """Solve once.
 
     Returns
     -------
     gait, step
+    speeds : of all robots, m/s
     order : the exchanged one, None if no switches met
     cuts : refined; the same object where nothing is to refine
     binding : whether the gait wanted to move further than `reach`
@@ -119,14 +120,14 @@ def _solve(
     unknowns, rows, binding = bounded(problem, p, z, reach)
     solution = p.solve(z, parameters, unknowns, rows, options=_IPOPT)
     trial = gait_from(p.layout, solution.z)
-    speed = float(solution.z[p.layout.unknown(0, "speed")])
+    speeds = tuple(float(solution.z[p.layout.unknown(r, "speed")]) for r in range(len(problem.robots)))
     defect = defects(p, solution, parameters, mesh)
     step = Step(
-        Rung(own, mesh.elements, reach), speed, speed, solution.iterations,
+        Rung(own, mesh.elements, reach), speeds[0], speeds[0], solution.iterations,
         explained(p, solution, trial), mesh.elements, float(defect.max()),
     )  # fmt: skip
     finer = cuts
     if mesh.elements < _MOST_ELEMENTS and defect.max() > _DEFECT:
         finer = refined_cuts(defect, cuts, _DEFECT)
     met = exchanged(solution.z[2 : 2 + p.layout.switches], order)
-    return trial, step, met, finer, binding(solution.z)
+    return trial, step, speeds, met, finer, binding(solution.z)

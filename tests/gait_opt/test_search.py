@@ -197,13 +197,13 @@ def test_certificate_finds_faults():
     problem = CycleProblem(
         (ROBOT,), "complex", Goal(envelope_m=0.05), Limits(min_dwell_s=0.24, max_curvature_1_m=10)
     )
-    certificate, _ = certify(problem, gait, 0.3)
+    certificate, _ = certify(problem, gait, (0.3,))
     words = " ".join(certificate.failures)
     assert not certificate.passed
     for fault in ("optimizer's 0.3000", "curvature reaches", "swept band"):
         assert fault in words
     tight = CycleProblem((ROBOT,), "complex", Goal(), Limits(min_dwell_s=0.2499))
-    assert certify(tight, leaned(gait, 0.05), 0.2)[0].dwell_ok is False
+    assert certify(tight, leaned(gait, 0.05), (0.2,))[0].dwell_ok is False
 
 
 def test_periodicity_gap_sees_a_motion_that_is_not_periodic():

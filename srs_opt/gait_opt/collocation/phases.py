@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy import sparse
 
+from srs_opt.gait_opt.collocation.goal_rows import Times
 from srs_opt.gait_opt.collocation.layout import NODES, Mesh
-from srs_opt.gait_opt.collocation.program import Times
 
 Cuts = tuple[np.ndarray, ...]
 COINCIDENT = 1e-7  # cycles; switches closer than this are one instant, their order is free

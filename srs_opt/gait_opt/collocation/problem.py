@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
+from srs_opt.gait_opt.collocation.goal_rows import GoalKind, Times
 from srs_opt.gait_opt.collocation.guess import parameter_numbers
 from srs_opt.gait_opt.collocation.layout import ENVELOPE_UNIT_M, PRESSURE_UNIT_KPA, Layout, Mesh
 from srs_opt.gait_opt.collocation.point import QUADRATURES, PointKind
-from srs_opt.gait_opt.collocation.program import Program, Times, program
-from srs_opt.gait_opt.goal import Goal, Limits
+from srs_opt.gait_opt.collocation.program import Program, program
+from srs_opt.gait_opt.goal import LEAST_TURN_RAD_S, STRAIGHT_RAD_S, TURN_ERROR, Goal, Limits
+from srs_opt.gait_opt.objectives.objective import Formulas, formulas
 from srs_opt.model.parameters import Structure
 from srs_opt.model.registry import build
 from srs_opt.robot import Robot
 
 _FREE = 1e3
+_FASTEST_TURN_RAD_S = 30.0
 _HAT = 0.5  # half width of a smoothed switch over the mean element
-_LEAST_SPEED_M_S = 0.02
+_WITHIN = 0.75  # share of the tolerated turn that robots other than the first may use
 
 
 @dataclass(frozen=True)
@@ -27,7 +31,7 @@ class CycleProblem:
     Attributes
     ----------
     robots : tuple of Robot
-        The first is the nominal one: a wanted turn is wanted of it.
+        The first is the nominal one: it keeps a wanted turn exactly, the others within tolerance.
     model : str
     goal : Goal
     limits : Limits
@@ -45,9 +49,14 @@ class CycleProblem:
     relaxed: bool = False
 
     @property
+    def formulas(self) -> Formulas:
+        """The objective's formulas for these robots and valves."""
+        return formulas(self.goal.aim, self.robots[0].segments, self.intervals)
+
+    @property
     def needs_envelope(self) -> bool:
         """Whether the swept band enters the problem."""
-        return self.goal.objective == "slim" or self.goal.envelope_m is not None
+        return self.goal.envelope_m is not None or self.formulas.uses_band
 
     def kinds(self, ordered: bool = False) -> tuple[PointKind, ...]:
         """Return the equations of every robot."""
@@ -69,11 +78,10 @@ class CycleProblem:
 
     def program(self, elements: int, times: Times | None = None) -> Program:
         """Return the assembled program for a number of elements (or for phases that end at switches)."""
-        merit = "tightest" if self.goal.tightest else self.goal.objective
-        arguments = (merit, self.goal.radius_m is not None, self.goal.envelope_m is not None)
+        kind = GoalKind(self.goal.aim, self.goal.radius_m is not None, self.goal.envelope_m is not None)
         if times is not None:
-            return Program(self.layout(elements, ordered=True), *arguments, times)
-        return program(self.layout(elements), *arguments)
+            return Program(self.layout(elements, ordered=True), kind, times)
+        return program(self.layout(elements), kind)
 
     def parameters(
         self,
@@ -90,8 +98,8 @@ class CycleProblem:
             goal.radius_m or 1.0,
             goal.envelope_m or 1.0,
             limits.chamber_volume_m3 or 0.0,
-            weight_n(self.robots[0]),
             merit_unit,
+            *(weight_n(robot) for robot in self.robots),
         ]
         if p.times is None:
             place = np.stack([mesh.points(), np.repeat(np.diff(mesh.edges), 3)], axis=1).ravel()
@@ -120,21 +128,23 @@ class CycleProblem:
             low[2] = high[2] = 0.0  # the first switch sets the clock
         for r in range(len(self.robots)):
             speed, turn = layout.unknown(r, "speed"), layout.unknown(r, "turn_rate")
-            low[speed], high[speed] = -_FREE, _FREE
-            if goal.objective in ("transport", "slim", "turn"):
-                low[speed] = goal.speed_m_s or _LEAST_SPEED_M_S
-            low[turn], high[turn] = -30.0, 30.0
-            if r == 0:
-                if goal.turn_rate_rad_s is not None:
-                    low[turn] = high[turn] = goal.turn_rate_rad_s
-                elif goal.tightest:
-                    low[turn] = 0.05
-                elif goal.radius_m is None:
-                    low[turn] = high[turn] = 0.0
+            low[speed], high[speed] = goal.floor_m_s or -_FREE, _FREE
+            low[turn], high[turn] = self._turn_bounds(nominal=r == 0)
             for side in ("left", "right"):
                 low[layout.unknown(r, side)] = 0.0
                 high[layout.unknown(r, side)] = 20.0
         return low, high
+
+    def _turn_bounds(self, nominal: bool) -> tuple[float, float]:
+        goal = self.goal
+        if goal.turn in ("radius", "any"):
+            return -_FASTEST_TURN_RAD_S, _FASTEST_TURN_RAD_S
+        if goal.turn == "side":
+            low, high = sorted((goal.sense * LEAST_TURN_RAD_S, goal.sense * _FASTEST_TURN_RAD_S))
+            return low, high
+        wanted = goal.turn_rate_rad_s or 0.0
+        spare = 0.0 if nominal else _WITHIN * max(STRAIGHT_RAD_S, TURN_ERROR * abs(wanted))
+        return wanted - spare, wanted + spare
 
     def _row_bounds(self, p: Program) -> tuple[np.ndarray, np.ndarray]:
         low, high = [], []
@@ -152,14 +162,12 @@ class CycleProblem:
                 most = self.limits.max_curvature_1_m or np.inf
                 low.append(np.full(n * kind.segments, -most))
                 high.append(np.full(n * kind.segments, most))
-        rows = p.goal.size1_out(0)
-        low.append(np.zeros(rows))
-        goal_high = np.full(rows, np.inf)
-        goal_high[: p.goal_equalities] = 0.0
-        high.append(goal_high)
+        low.append(p.goal.low)
+        high.append(p.goal.high)
         return np.concatenate(low), np.concatenate(high)
 
 
+@lru_cache(maxsize=64)
 def weight_n(robot: Robot) -> float:
     """Return the robot's weight, effects on the mass included, N."""
     import casadi as ca

@@ -11,84 +11,17 @@ import casadi as ca
 import numpy as np
 from scipy import sparse
 
-from srs_opt.gait_opt.collocation.layout import (
-    ENVELOPE_UNIT_M,
-    PRESSURE_UNIT_KPA,
-    ROBOT_UNKNOWNS,
-    Layout,
-    local_inputs,
-    row_outputs,
-)
+from srs_opt.gait_opt.collocation.goal_rows import GOAL_NUMBERS, GoalKind, Times, goal_rows
+from srs_opt.gait_opt.collocation.layout import ROBOT_UNKNOWNS, Layout, local_inputs, row_outputs
 from srs_opt.gait_opt.collocation.point import PointKind, point_functions
 from srs_opt.gait_opt.collocation.sparse import Gather, hessian_gather, jacobian_gather, to_dm
 from srs_opt.model.registry import build
 from srs_opt.processes import interrupt_not_lost
 
-GOAL_NUMBERS = ("min_dwell_s", "radius_m", "envelope_m", "chamber_volume_m3", "weight_n", "merit_unit")
 _MINIMUM_DEGREE = 0  # MUMPS's ordering: quicker here than its own choice; METIS draws at random, bits differ
 # starts are simulated motions, nearly feasible: steps that leave their neighbourhood follow the linearized
 # friction to where nothing holds any more, and dozens of iterations find no way back
 _FEASIBLE = 3.0
-
-
-@dataclass(frozen=True)
-class Times:
-    """Place and width of the points by the switch times: ``matrix @ switches + constant`` (2 points each).
-
-    `turns` (points, switches) fixes the switch order; ``lengths @ switches + offsets`` are the phases'
-    lengths, which must not be negative.
-    """
-
-    matrix: sparse.csr_matrix
-    constant: np.ndarray
-    turns: np.ndarray
-    lengths: np.ndarray
-    offsets: np.ndarray
-
-
-def goal_rows(
-    layout: Layout, objective: str, radius: bool, envelope: bool, times: Times | None = None
-) -> tuple[ca.Function, int]:
-    """Return ``(head unknowns, goal numbers) -> rows`` and how many of them are equalities (the first).
-
-    The head is what all robots share, then five unknowns per robot. Rows: radius (= 0); dwell (>= 0);
-    phases' lengths (>= 0); merit of every robot minus the worst (>= 0); envelope (>= 0).
-    """
-    robots = len(layout.kinds)
-    shared = ca.SX.sym("shared", layout.shared)
-    own = [ca.SX.sym(f"own{r}", len(ROBOT_UNKNOWNS)) for r in range(robots)]
-    number = {name: ca.SX.sym(name) for name in GOAL_NUMBERS}
-    frequency, pressure, merit = shared[0], PRESSURE_UNIT_KPA * shared[1], shared[layout.merit]
-    rows: list[ca.SX] = []
-    if radius:
-        rows.append(own[0][0] - number["radius_m"] * own[0][1])
-    k = layout.kinds[0].intervals
-    relaxed = layout.kinds[0].relaxed
-    for i in range(0 if relaxed else layout.kinds[0].segments):
-        switches = ca.vertsplit(shared[2 + 2 * k * i : 2 + 2 * k * (i + 1)])
-        on, off = switches[:k], switches[k:]
-        for start, end, following in zip(on, off, [*on[1:], on[0] + 1]):
-            least = number["min_dwell_s"] * frequency
-            rows += [end - start - least, following - end - least]
-    if times is not None:
-        rows.append(ca.DM(times.lengths) @ shared[2 : 2 + layout.switches] + times.offsets)
-    fills = 2 * k * layout.kinds[0].segments
-    for u in own:
-        speed, turn_rate, work, left, right = ca.vertsplit(u)
-        air = fills * number["chamber_volume_m3"] * pressure * 1e3
-        value = {
-            "speed": speed,
-            "transport": -(work + air) * frequency / (number["weight_n"] * speed),
-            "turn": speed,
-            "tightest": -10 * speed / turn_rate,
-            "slim": -(left + right),
-        }[objective]
-        rows.append(value / number["merit_unit"] - merit)
-        if envelope:
-            rows.append(number["envelope_m"] / ENVELOPE_UNIT_M - left - right)
-    head = ca.vertcat(shared, *own)
-    function = ca.Function("goal", [head, ca.vertcat(*number.values())], [ca.vertcat(*rows)])
-    return function, int(radius)
 
 
 @dataclass(frozen=True)
@@ -118,12 +51,10 @@ class Solution:
 class Program:
     """One problem: kinds of equations, number of elements, kind of goal. Numbers come with each solve."""
 
-    def __init__(
-        self, layout: Layout, objective: str, radius: bool, envelope: bool, times: Times | None = None
-    ) -> None:
+    def __init__(self, layout: Layout, goal: GoalKind, times: Times | None = None) -> None:
         self.layout = layout
         self.times = times
-        self.goal, self.goal_equalities = goal_rows(layout, objective, radius, envelope, times)
+        self.goal = goal_rows(layout, goal, times)
         head = [np.arange(layout.shared)]
         head += [layout.start(r) + np.arange(len(ROBOT_UNKNOWNS)) for r in range(len(layout.kinds))]
         self.head = np.concatenate(head)
@@ -159,7 +90,7 @@ class Program:
     def _build(self) -> None:
         layout = self.layout
         z = ca.MX.sym("z", layout.size)
-        self.parameter_sizes = [2 * layout.points, len(GOAL_NUMBERS), 1]
+        self.parameter_sizes = [2 * layout.points, len(GOAL_NUMBERS) + len(layout.kinds), 1]
         for kind in layout.kinds:
             self.parameter_sizes += [
                 build(kind.structure)[0].vector.numel(), kind.states, kind.switches * layout.points
@@ -168,7 +99,7 @@ class Program:
         mesh, numbers, half_width, *rest = ca.vertsplit(
             parameters, np.cumsum([0, *self.parameter_sizes]).tolist()
         )
-        self.row_counts = [part["rows"] for part in self._parts] + [self.goal.size1_out(0)]
+        self.row_counts = [part["rows"] for part in self._parts] + [self.goal.low.size]
         total = sum(self.row_counts)
         lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", total)
         rows, jacobians = [], []
@@ -180,7 +111,8 @@ class Program:
             jacobians.append(jac)
             hessian += hess
         head = z[self.head.tolist()]
-        g, jac, hess = self._goal_derivatives(head, numbers, splits[-1])
+        robots = ca.vertcat(*rest[0::3])
+        g, jac, hess = self._goal_derivatives(head, numbers, robots, splits[-1])
         rows.append(g)
         spread = _selection(self.head, layout.size)
         jacobians.append(jac @ spread)
@@ -226,13 +158,16 @@ class Program:
         hessian: Gather = part["hessian"]
         return g, jacobian(_nonzeros(slope)), hessian(_nonzeros(bend))
 
-    def _goal_derivatives(self, head: ca.MX, numbers: ca.MX, lam: ca.MX) -> tuple[ca.MX, ca.MX, ca.MX]:
+    def _goal_derivatives(
+        self, head: ca.MX, numbers: ca.MX, robots: ca.MX, lam: ca.MX
+    ) -> tuple[ca.MX, ca.MX, ca.MX]:
         h, n, m = ca.SX.sym("h", self.head.size), ca.SX.sym("n", numbers.numel()), ca.SX.sym("m", lam.numel())
-        rows = self.goal(h, n)
-        first = ca.Function("goal_slope", [h, n], [rows, ca.jacobian(rows, h)])
-        second = ca.Function("goal_bend", [h, n, m], [ca.hessian(ca.dot(m, rows), h)[0]])
-        g, jac = first(head, numbers)
-        return g, jac, second(head, numbers, lam)
+        p = ca.SX.sym("p", robots.numel())
+        rows = self.goal.function(h, n, p)
+        first = ca.Function("goal_slope", [h, n, p], [rows, ca.jacobian(rows, h)])
+        second = ca.Function("goal_bend", [h, n, p, m], [ca.hessian(ca.dot(m, rows), h)[0]])
+        g, jac = first(head, numbers, robots)
+        return g, jac, second(head, numbers, robots, lam)
 
     def _solver(self, **changes: Any) -> ca.Function:
         key = tuple(sorted(changes.items()))
@@ -297,6 +232,6 @@ def _nonzeros(matrix: ca.MX) -> ca.MX:
 
 
 @lru_cache(maxsize=32)
-def program(layout: Layout, objective: str, radius: bool, envelope: bool) -> Program:
+def program(layout: Layout, goal: GoalKind) -> Program:
     """Return the problem with a fixed mesh; built once per process."""
-    return Program(layout, objective, radius, envelope)
+    return Program(layout, goal)

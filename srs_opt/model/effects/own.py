@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
-import inspect
 import re
-import sys
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -94,19 +91,8 @@ def check(effect: Effect, built_in: set[str]) -> None:
 
 def definition(effect: Effect) -> str:
     """Return a hash that changes with the effect's parameters and with the file that defines its hooks."""
-    digest = hashlib.sha256(f"{effect.name} {effect.kind} {effect.parameters!r} {effect.of_tether}".encode())
-    for hook in _hooks(effect):
-        digest.update(b"hook")
-        code = getattr(hook, "__code__", None)
-        if code is None:  # an object that can be called
-            digest.update(repr(hook).encode())
-            continue
-        constants = [c for c in code.co_consts if isinstance(c, (int, float, str, type(None)))]
-        digest.update(code.co_code + repr(constants).encode())
-        source = inspect.getsourcefile(hook)
-        if source and Path(source).is_file():
-            digest.update(Path(source).read_bytes())
-    return digest.hexdigest()[:16]
+    words = f"{effect.name} {effect.kind} {effect.parameters!r} {effect.of_tether}"
+    return plugins.digest(_hooks(effect), words)
 
 
 def _hooks(effect: Effect) -> list[Callable[..., Any]]:
@@ -130,20 +116,7 @@ def exported() -> bytes | None:
     own = [r for r in _own.values() if not r.installed]
     if not own:
         return None
-    import cloudpickle
-
-    modules = {getattr(hook, "__module__", None) for r in own for hook in _hooks(r.effect)}
-    by_value = [sys.modules[m] for m in modules if m in sys.modules and m.split(".")[0] not in _SHARED]
-    for module in by_value:
-        cloudpickle.register_pickle_by_value(module)
-    try:
-        return bytes(cloudpickle.dumps(own))
-    finally:
-        for module in by_value:
-            cloudpickle.unregister_pickle_by_value(module)
-
-
-_SHARED = ("__main__", "srs_opt", "planners", "casadi")  # main is by value anyway, the others are installed
+    return plugins.dumped(own, [hook for r in own for hook in _hooks(r.effect)])
 
 
 def adopt(effects: bytes) -> None:
