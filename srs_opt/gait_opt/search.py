@@ -112,14 +112,8 @@ def search(
         lower, upper = rungs[:cut], rungs[cut:]
         reach = _EXACT_REACH
     else:
-        if (
-            problem.goal.turn == "side"
-            and problem.goal.sense * orbits_of(problem, warm)[0].turn_rate_rad_s < 0
-        ):
-            say(f"the earlier gait turns away from the {problem.goal.side}: its mirror image is taken")
-            warm = warm.mirrored()
-        candidates, lower = [steered(problem, within(problem.limits, warm))], ()
-        near = candidates[0] == warm and score(problem, warm, orbits_of(problem, warm)).miss < _KEPT
+        start, near = _warmed(problem, warm, say)
+        candidates, lower = [start], ()
         upper = () if near else (replace(_MOVED, friction_speed_m_s=max(own, _MOVED.friction_speed_m_s)),)
         reach = _NEAR_REACH if near else _MOVED_REACH
     climbing = _Climbing(problem, len(candidates), say)
@@ -151,6 +145,18 @@ def search(
         time.perf_counter() - begun,
         interrupted,
     )
+
+
+def _warmed(problem: CycleProblem, warm: Gait, say: Say) -> tuple[Gait, bool]:
+    """Return an earlier result inside the limits, and whether it does what is wanted as it is."""
+    goal = problem.goal
+    if goal.turn == "side" and goal.sense * orbits_of(problem, warm)[0].turn_rate_rad_s < 0:
+        say(f"the earlier gait turns away from the {goal.side}: its mirror image is taken")
+        warm = warm.mirrored()
+    start = within(problem.limits, warm)
+    if start == warm and score(problem, warm, orbits_of(problem, warm)).miss < _KEPT:
+        return warm, True
+    return steered(problem, start), False
 
 
 def _refuse_out_of_reach(

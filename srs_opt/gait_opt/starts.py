@@ -53,6 +53,8 @@ def steered(problem: CycleProblem, gait: Gait) -> Gait:
     robot = replace(problem.robots[0], friction_speed_m_s=_SMOOTHED_M_S)
     if goal.turn == "side":
         turn = goal.sense * _STEERED_RAD_S
+        if goal.sense * steady_gait(robot, gait, problem.model).turn_rate_rad_s >= _STEERED_RAD_S:
+            return gait
         return aimed(gait, lambda g: steady_gait(robot, g, problem.model).turn_rate_rad_s - turn, 0.1)
     if goal.radius_m is None and not goal.turn_rate_rad_s:
         return gait
