@@ -96,7 +96,7 @@ def test_objectives_travel_and_are_known_by_name():
     again = pickle.loads(pickle.dumps(OWN))
     assert again == OWN
     assert again.merit is not None
-    assert pickle.loads(pickle.dumps(built_in()["slim"])) is built_in()["slim"]
+    assert pickle.loads(pickle.dumps(built_in()["slim"])) == built_in()["slim"]
     known = register_objective(Objective("least_bend", bend))
     assert objective_named("least_bend") is known
     with pytest.raises(InputError, match="registered before"):

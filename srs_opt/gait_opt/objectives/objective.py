@@ -67,18 +67,8 @@ class Objective:
         object.__setattr__(self, "definition", plugins.digest((self.merit, *self.constraints)))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        from srs_opt.gait_opt.objectives.registry import built_in
-
-        if built_in().get(self.name) == self:
-            return _named, (self.name,)
         state = {k: v for k, v in vars(self).items() if k != "definition"}
         return _restored, (plugins.dumped(state, (self.merit, *self.constraints)),)
-
-
-def _named(name: str) -> Objective:
-    from srs_opt.gait_opt.objectives.registry import built_in
-
-    return built_in()[name]
 
 
 def _restored(state: bytes) -> Objective:
