@@ -15,6 +15,9 @@ from srs_opt.calibrate.model import Model, Values, camera_effects
 from srs_opt.calibrate.nominal import Nodes, conditions_of
 from srs_opt.calibrate.sensitivity import variation
 from srs_opt.measurement.records import Trial
+from srs_opt.measurement.spots import Spots
+from srs_opt.model.kinematics import Chain, arc
+from srs_opt.model.mechanics import Mechanics
 from srs_opt.model.parameters import Structure, effect_symbols
 from srs_opt.model.registry import build
 from srs_opt.simulate.compiled import compiled
@@ -41,7 +44,7 @@ class Prediction:
 
 
 @lru_cache(maxsize=8)
-def _picture(structure: Structure, centre_only: bool) -> ca.Function:
+def _picture(structure: Structure, centre_only: bool, spots: Spots | None) -> ca.Function:
     """Return ``(pose, kappa, camera, p) -> (points, by pose, by kappa, by camera, by p)``, mapped."""
 
     def make() -> ca.Function:
@@ -50,9 +53,10 @@ def _picture(structure: Structure, centre_only: bool) -> ca.Function:
         values = {e.name: effect_symbols(e, structure.links) for e in camera_effects()}
         camera = ca.vertcat(*(v for own in values.values() for v in own.values()))
         c, s = ca.cos(pose[2]), ca.sin(pose[2])
-        x = pose[0] + c * m.chain.x - s * m.chain.y
-        y = pose[1] + s * m.chain.x + c * m.chain.y
-        x, y = _seen(x, y, pose[2] + m.chain.angle, values, m.mass if centre_only else None)
+        body = _body_points(m, spots)
+        x = pose[0] + c * body.x - s * body.y
+        y = pose[1] + s * body.x + c * body.y
+        x, y = _seen(x, y, pose[2] + body.angle, values, m.mass if centre_only else None)
         points = ca.vec(ca.horzcat(x, y).T)
         p = parameters.vector
         by = [ca.densify(ca.jacobian(points, v)) for v in (pose, m.kappa, camera, p)]
@@ -61,7 +65,29 @@ def _picture(structure: Structure, centre_only: bool) -> ca.Function:
         return mapped(single, (2, 3))
 
     seen = " ".join(e.name for e in camera_effects())
-    return compiled(f"picture {centre_only} {structure} {seen}", make)
+    return compiled(f"picture {centre_only} {spots or ''} {structure} {seen}", make)
+
+
+def _body_points(m: Mechanics, spots: Spots | None) -> Chain:
+    """Return the markers' places and headings in the robot's frame.
+
+    From the carrying link's centre straight on, then along the chamber's arc, then to the left.
+    """
+    if spots is None:
+        return m.chain
+    length, gap = m.parameters["segment_length_m"], m.gap_length
+    columns = []
+    for spot in spots:
+        i = spot.carrier
+        x, y, angle = m.chain.x[i], m.chain.y[i], m.chain.angle[i]
+        if spot.link is not None:
+            x, y = x + spot.dx_m * ca.cos(angle), y + spot.dx_m * ca.sin(angle)
+        else:
+            for way, kappa in ((gap / 2, m.gap_ratio * m.kappa[i]), (spot.at * length, m.kappa[i])):
+                dx, dy, angle = arc(way, kappa, angle)
+                x, y = x + dx, y + dy
+        columns.append((x - spot.dy_m * ca.sin(angle), y + spot.dy_m * ca.cos(angle), angle))
+    return Chain(*(ca.vertcat(*column) for column in zip(*columns)))
 
 
 def _seen(
@@ -118,7 +144,7 @@ def predict(
     pose = _hermite(nodes.time_s, nodes.body[:, :3], rate, at)
     kappa = _hermite(nodes.time_s, nodes.kappa, nodes.dkappa, at)
     structure, kept = model.structure(values, coordinates)
-    function = _picture(structure, centre_only)
+    function = _picture(structure, centre_only, None if centre_only else trial.spots)
     points, by_pose, by_kappa, by_camera, by_p = evaluate(
         function, (pose, kappa), nodes.camera, nodes.p[kept]
     )

@@ -49,10 +49,11 @@ def calibrate(
             raise InputError(f"data set '{dataset.name}': no usable trial and no map to calibrate on")
         return fit_maps(dataset, model, tell)
     for t in trials:
-        if t.markers_m is not None and t.markers_m.shape[1] != dataset.robot.links:
+        expected = dataset.robot.links if t.spots is None else len(t.spots)
+        if t.markers_m is not None and t.markers_m.shape[1] != expected:
             raise InputError(
-                f"trial {t.name} has {t.markers_m.shape[1]} markers, robot '{dataset.robot.name}' has "
-                f"{dataset.robot.links} links"
+                f"trial {t.name} has {t.markers_m.shape[1]} markers, "
+                f"robot '{dataset.robot.name}' and the set's markers make {expected}"
             )
     base = fitted_coordinates(dataset.robot)
     experiment = Experiment(Model(dataset.robot, model), trials, noise_sd_m(dataset), dataset.bench)

@@ -119,7 +119,8 @@ def proposals(experiment: Experiment, trials: Sequence[Trial]) -> Mapping[str, T
     """Return trials worth considering, beside repeats of what was done."""
     model = max(trials, key=lambda t: (t.pressure_kpa, t.frequency_hz))
     time_s = np.arange(int(_SECONDS * _RATE_HZ)) / _RATE_HZ
-    blank = np.zeros((time_s.size, experiment.model.links, 2))
+    seen = experiment.model.links if model.spots is None else len(model.spots)
+    blank = np.zeros((time_s.size, seen, 2))
     plain = replace(
         model,
         time_s=time_s,

@@ -59,13 +59,14 @@ class ResidualFunctions:
         if self.markers == 1:
             return (("motion along", 1), ("motion across", 1))
         bends = min(3, self.markers - 2)
-        return (
+        found = (
             ("motion along", 1),
             ("motion across", 1),
             ("heading", 1),
             ("bending of the body", bends),
             ("length of the body", 1),
         )
+        return tuple(part for part in found if part[1])
 
     def groups(self) -> tuple[Group, ...]:
         """Return the groups in the order of the columns."""

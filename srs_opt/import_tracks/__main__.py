@@ -26,6 +26,12 @@ def build_parser() -> Parser:
     parser.add_argument("--trials", type=Path, required=True, metavar="FILE", help="list of trials (CSV)")
     parser.add_argument("--name", help="name of the data set (default: the output folder's)")
     parser.add_argument("--head-marker", metavar="LABEL", help="head's marker (default: told by the bends)")
+    parser.add_argument(
+        "--markers",
+        default="links",
+        metavar="WHERE",
+        help="where they sit, tail to head: links (default), chamber_ends, chamber_middles, or a YAML list",
+    )
     parser.add_argument("--format", default="auto", metavar="NAME", help="files' format (default: found)")
     parser.add_argument("--columns", type=Path, metavar="MAP.yaml", help="which column of a table is what")
     parser.add_argument("--rate", type=positive_float, metavar="HZ", help="frames per second, where not told")
@@ -68,6 +74,7 @@ def run(options: argparse.Namespace) -> Answer:
     from srs_opt.errors import InputError
     from srs_opt.measurement.dataset import write_dataset
     from srs_opt.measurement.importing import ImportOptions, import_takes, read_schedules, read_trial_list
+    from srs_opt.measurement.spots import load_spots
     from srs_opt.measurement.takes.columns import load_columns
     from srs_opt.measurement.takes.formats import read_take
     from srs_opt.measurement.takes.take import ReadSettings
@@ -92,6 +99,7 @@ def run(options: argparse.Namespace) -> Answer:
         points=options.points,
         valve_start_s=options.valve_start,
         marker_sd_m=options.marker_sd,
+        spots=load_spots(options.markers, robot.links),
     )
     name = options.name or options.out.resolve().name
     dataset, notes = import_takes(takes, rows, robot, name, settings, schedules)

@@ -94,7 +94,9 @@ def _pictures(dataset: DataSet, record: dict[str, Any], folder: Path) -> list[Pa
         trial = dataset.trial(sharpest["trial"])
         centre = trial.centre_m
         if trial.markers_m is not None:
-            centre = shape_from_markers(dataset.robot, trial.markers_m, dataset.marker_sd_m).centre_m
+            centre = shape_from_markers(
+                dataset.robot, trial.markers_m, dataset.marker_sd_m, spots=trial.spots
+            ).centre_m
         assert centre is not None
         steady = np.asarray(centre)[trial.time_s >= sharpest["from_s"]]
         figure = circle_figure(steady, fit_circle(steady))

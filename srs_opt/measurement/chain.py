@@ -8,20 +8,31 @@ frames and with its Jacobian in closed form. A configuration is ``q = (p_x, p_y,
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from srs_opt.measurement.records import Array
+from srs_opt.measurement.spots import Spots, one_per_link
 from srs_opt.robot import Robot
 
 
 @dataclass(frozen=True)
 class Chain:
-    """What the geometry needs of a robot: links N, chamber length l, gap L_o."""
+    """What the geometry needs of a robot: links N, chamber length l, gap L_o; and where its M markers sit.
+
+    Without `spots` one marker sits on every link's centre, tail to head.
+    """
 
     links: int
     segment_length_m: float
     gap_length_m: float
+    spots: Spots | None = None
+
+    @property
+    def markers(self) -> int:
+        """Number M of markers."""
+        return self.links if self.spots is None else len(self.spots)
 
     @property
     def unknowns(self) -> int:
@@ -33,10 +44,28 @@ class Chain:
         """Distance of neighbouring links when straight."""
         return self.segment_length_m + self.gap_length_m
 
+    @cached_property
+    def straight_m(self) -> Array:
+        """Markers of the straight robot, (M, 2): tail link at the origin, heading along x."""
+        q = np.zeros(self.unknowns)
+        q[0] = self.pitch_m * (self.links - 1) / 2
+        return marker_positions(self, q)
 
-def chain_of(robot: Robot) -> Chain:
-    """Return the geometry of `robot`."""
-    return Chain(robot.links, robot.segment_length_m, robot.gap_length_m)
+    @cached_property
+    def spacing_m(self) -> Array:
+        """Distances of markers that follow each other when straight, (M - 1,)."""
+        return np.linalg.norm(np.diff(self.straight_m, axis=0), axis=1)
+
+    def between_m(self, a: int, b: int) -> float:
+        """Distance of two markers when straight: they cannot be farther apart, save for offsets sideways."""
+        return float(np.linalg.norm(self.straight_m[a] - self.straight_m[b]))
+
+
+def chain_of(robot: Robot, spots: Spots | None = None) -> Chain:
+    """Return the geometry of `robot`, with markers at `spots` (none: one on every link's centre)."""
+    if spots == one_per_link(robot.links):
+        spots = None
+    return Chain(robot.links, robot.segment_length_m, robot.gap_length_m, spots)
 
 
 def _sinc(h: Array) -> tuple[Array, Array]:
@@ -102,3 +131,62 @@ def position_jacobian(chain: Chain, q: Array) -> Array:
 def _heading_slopes(chain: Chain) -> Array:
     below = np.tril(np.ones((chain.links, chain.links - 1)), -1) * chain.segment_length_m
     return np.asarray(below - below.mean(axis=0))
+
+
+def _along(chain: Chain) -> tuple[np.ndarray, Array, Array, Array]:
+    """Return per marker: carrying link, straight way along it, way along the chamber, offset to the left."""
+    spots = chain.spots or ()
+    gap, l = chain.gap_length_m, chain.segment_length_m
+    straight = [s.dx_m if s.link is not None else gap / 2 for s in spots]
+    return (
+        np.array([s.carrier for s in spots]),
+        np.array(straight),
+        np.array([s.at * l for s in spots]),
+        np.array([s.dy_m for s in spots]),
+    )
+
+
+def _carried(chain: Chain, q: Array) -> tuple[Array, Array]:
+    """Return heading and curvature at the link that carries each marker, (..., M); zero beyond the head."""
+    carrier = _along(chain)[0]
+    kappa = np.concatenate([q[..., 3:], np.zeros((*q.shape[:-1], 1))], axis=-1)
+    return headings(chain, q)[..., carrier], kappa[..., carrier]
+
+
+def marker_positions(chain: Chain, q: Array) -> Array:
+    """Return the markers' positions, shape (..., M, 2).
+
+    From the carrying link's centre straight on, then along the chamber's arc (the paper's (3) for a part of
+    it), then to the left.
+    """
+    links = link_positions(chain, q)
+    if chain.spots is None:
+        return links
+    carrier, straight, way, left = _along(chain)
+    theta, kappa = _carried(chain, q)
+    chord, _ = _sinc(way * kappa / 2)
+    arc = (way * chord)[..., None] * _unit(theta + way * kappa / 2)
+    side = left[:, None] * _quarter_turn(_unit(theta + way * kappa))
+    return np.asarray(links[..., carrier, :] + straight[:, None] * _unit(theta) + arc + side)
+
+
+def marker_jacobian(chain: Chain, q: Array) -> Array:
+    """Return the derivative of `marker_positions`, shape (..., M, 2, N + 2)."""
+    links = position_jacobian(chain, q)
+    if chain.spots is None:
+        return links
+    carrier, straight, way, left = _along(chain)
+    theta, kappa = _carried(chain, q)
+    chord, slope = _sinc(way * kappa / 2)
+    turn = np.zeros((chain.markers, chain.unknowns))  # d theta of the carrier
+    turn[:, 2], turn[:, 3:] = 1.0, _heading_slopes(chain)[carrier]
+    bend = np.zeros_like(turn)  # d (way * kappa): the turn along the chamber
+    inside = carrier < chain.links - 1
+    bend[inside, 3 + carrier[inside]] = way[inside]
+    out = links[..., carrier, :, :].copy()
+    out += (straight[:, None] * _quarter_turn(_unit(theta)))[..., None] * turn[:, None, :]
+    middle = _unit(theta + way * kappa / 2)
+    out += ((way * chord)[..., None] * _quarter_turn(middle))[..., None] * (turn + bend / 2)[:, None, :]
+    out += ((way * slope / 2)[..., None] * middle)[..., None] * bend[:, None, :]
+    out -= (left[:, None] * _unit(theta + way * kappa))[..., None] * (turn + bend)[:, None, :]
+    return np.asarray(out)

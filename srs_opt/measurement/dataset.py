@@ -99,7 +99,9 @@ def _header(dataset: DataSet) -> str:
     import yaml
 
     camera = {"rate_hz": float(dataset.rate_hz), "marker_sd_m": float(dataset.marker_sd_m)}
-    record = {"name": dataset.name, "robot": "robot.yaml", "camera": camera, "markers": dataset.markers}
+    spots = next((t.spots for t in dataset.trials if t.spots is not None), None)
+    markers = dataset.markers if spots is None else [spot.record() for spot in spots]
+    record = {"name": dataset.name, "robot": "robot.yaml", "camera": camera, "markers": markers}
     return yaml.safe_dump(record, sort_keys=False)
 
 

@@ -1,20 +1,23 @@
-"""Find the robot among unordered positions: a row of N positions one pitch apart."""
+"""Find the robot among unordered positions: a row of M positions as far apart as its markers sit."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 
 from srs_opt.measurement.chain import Chain
 from srs_opt.measurement.records import Array
 
-TOLERANCE = 0.25  # of a pitch
+TOLERANCE = 0.25  # of the distance of two markers
+UNEVEN = 0.15  # of their mean: spacings that differ by more end to end tell which end is the tail
 MOST_PATHS = 200_000
 
 
 def find_chain(chain: Chain, positions: Array) -> np.ndarray | None:
-    """Return the indices of the N positions that best make a chain, in order along it; None if none do.
+    """Return the indices of the M positions that best make a chain, in the markers' order; None if none do.
 
-    Which end is the tail is not known here.
+    Which end is the tail is not known here where the spacing is `symmetric`.
 
     Parameters
     ----------
@@ -23,41 +26,55 @@ def find_chain(chain: Chain, positions: Array) -> np.ndarray | None:
         NaN where there is none; ghosts allowed.
     """
     distance = np.linalg.norm(positions[:, None] - positions[None], axis=2)
-    misfit = np.abs(distance / chain.pitch_m - 1)
-    neighbours = [np.flatnonzero(row < TOLERANCE) for row in np.nan_to_num(misfit, nan=np.inf)]
+    misfit = np.abs(np.nan_to_num(distance, nan=np.inf) / chain.spacing_m[:, None, None] - 1)
+    neighbours = [[np.flatnonzero(row < TOLERANCE) for row in each] for each in misfit]
+    corners = _corners(chain.straight_m)
     best: tuple[float, tuple[int, ...]] = (np.inf, ())
     budget = MOST_PATHS
     stack: list[tuple[tuple[int, ...], float]] = [
-        ((i,), 0.0) for i in range(len(positions)) if len(neighbours[i])
+        ((i,), 0.0) for i in range(len(positions)) if len(neighbours[0][i])
     ]
     while stack and budget:
         budget -= 1
         path, cost = stack.pop()
         if cost >= best[0]:
             continue
-        if len(path) == chain.links:
+        if len(path) == chain.markers:
             best = (cost, path)
             continue
-        for j in neighbours[path[-1]]:
+        last = len(path) - 1
+        for j in neighbours[last][path[-1]]:
             if j not in path:
-                turn = _turn(positions, path, int(j))
+                turn = _turn(positions, path, int(j), corners)
                 if turn < 1.6:  # a segment does not bend by more than about a right angle
-                    stack.append(((*path, int(j)), cost + misfit[path[-1], j] + 0.05 * turn))
+                    stack.append(((*path, int(j)), cost + misfit[last, path[-1], j] + 0.05 * turn))
     return np.array(best[1]) if best[1] else None
 
 
-def _turn(positions: Array, path: tuple[int, ...], new: int) -> float:
+def symmetric(chain: Chain) -> bool:
+    """Whether the markers' spacing looks alike from both ends."""
+    gap = np.abs(chain.spacing_m - chain.spacing_m[::-1])
+    return bool(gap.max() < UNEVEN * chain.spacing_m.mean())
+
+
+def _corners(row: Array) -> Array:
+    """Return the angles by which a row of positions (M, 2) turns at its inner ones, (M - 2,)."""
+    a, b = np.diff(row[:-1], axis=0), np.diff(row[1:], axis=0)
+    return np.asarray(np.arctan2(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], (a * b).sum(axis=1)))
+
+
+def _turn(positions: Array, path: tuple[int, ...], new: int, corners: Array) -> float:
+    """Return by how much the path bends at its end, beyond what the straight robot's markers do there."""
     if len(path) < 2:
         return 0.0
-    a = positions[path[-1]] - positions[path[-2]]
-    b = positions[new] - positions[path[-1]]
-    return float(abs(np.arctan2(a[0] * b[1] - a[1] * b[0], a @ b)))
+    here = float(_corners(positions[[path[-2], path[-1], new]])[0]) - float(corners[len(path) - 2])
+    return abs(math.remainder(here, 2 * math.pi))
 
 
 def best_start(chain: Chain, cloud: Array, tries: int = 200) -> tuple[int, np.ndarray] | None:
     """Return the first frame that shows a whole chain, and the order of its positions."""
     counts = np.isfinite(cloud[..., 0]).sum(axis=1)
-    for frame in np.flatnonzero(counts >= chain.links)[:tries]:
+    for frame in np.flatnonzero(counts >= chain.markers)[:tries]:
         order = find_chain(chain, cloud[frame])
         if order is not None:
             return int(frame), order

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,20 +11,21 @@ import numpy as np
 
 from srs_opt.errors import InputError
 from srs_opt.measurement.chain import Chain, chain_of
+from srs_opt.measurement.cutting import SETTINGS, check_rest, check_turn, cut_trial
 from srs_opt.measurement.direction import head_first
-from srs_opt.measurement.find_chain import best_start
+from srs_opt.measurement.find_chain import best_start, symmetric
 from srs_opt.measurement.ground import ground_axes, to_ground, without_ghosts
 from srs_opt.measurement.labels import follow, take
 from srs_opt.measurement.onset import Gait, find_onset, noise_sd
 from srs_opt.measurement.read import parse_schedule
 from srs_opt.measurement.records import KINDS, Array, Bench, Check, DataSet, Schedule, Trial
+from srs_opt.measurement.spots import Spots
 from srs_opt.measurement.takes.take import Take
 from srs_opt.problem import Report
 from srs_opt.robot import Robot
 from srs_opt.table import Row, first_error, read_table
 
 Points = Literal["auto", "markers", "bodies"]
-SETTINGS = ("frequency_hz", "pressure_kpa", "offset", "phase_lag_rad")
 OPTIONAL = (
     "take",
     "heading_rad",
@@ -37,7 +37,6 @@ OPTIONAL = (
     "replicate_of",
     "kind",
 )
-MOST_BENT_RAD = 0.15  # between neighbouring chords at the start; wheels stick, so a few degrees stay at rest
 SAME_RATE = 1e-3  # rates found from rounded times differ by less
 SCALES = ((1.0, "metres"), (1e-3, "millimetres"), (1e-2, "centimetres"), (0.0254, "inches"))
 
@@ -58,6 +57,8 @@ class ImportOptions:
         Valves' start on the take's clock, for all takes; the trials' own column valve_start_s wins.
     marker_sd_m : float or None
         Noise of a coordinate; estimated from the tracks when not given.
+    spots : tuple of Spot or None
+        Where the markers sit, tail to head; None: one on every link's centre.
     """
 
     head_marker: str | None = None
@@ -65,6 +66,7 @@ class ImportOptions:
     points: Points = "auto"
     valve_start_s: float | None = None
     marker_sd_m: float | None = None
+    spots: Spots | None = None
 
 
 @dataclass(frozen=True)
@@ -193,16 +195,16 @@ def import_trial(
     source: Take, row: Row, robot: Robot, options: ImportOptions, schedule: Schedule | None = None
 ) -> tuple[Trial, TrialNote]:
     """Find the robot in one take, order its markers tail to head, and put it on the valves' clock."""
-    chain = chain_of(robot)
+    chain = chain_of(robot, options.spots)
     warnings: list[str] = list(source.told)
     labels, positions = _points(source, chain, options)
     cloud, found = _scaled(source, chain, positions, options.up, warnings)
     counts = np.isfinite(positions[..., 0]).sum(axis=1)
     seen, usual = int(counts.sum()), int(np.median(counts[counts > 0]))
-    if usual > chain.links:
+    if usual > chain.markers:
         raise InputError(
-            f"{source.source}: most frames show {usual} positions, the robot has {chain.links} links: one "
-            "marker on the centre of every link is needed; leave the others out (a table: --columns)"
+            f"{source.source}: most frames show {usual} positions, {_expected(chain)}; "
+            "say with --markers where they sit, or leave the others out (a table: --columns)"
         )
     frame, order = found
     owners = follow(chain, cloud, frame, order)
@@ -210,33 +212,43 @@ def import_trial(
     report = Report(Path("."))
     ends = (labels[order[0]], labels[order[-1]])
     frequency, lag = (row.number(name, report, 0.0) for name in ("frequency_hz", "phase_lag_rad"))
-    if head_first(chain, ends, source.time_s, tracks, frequency, lag, options.head_marker, warnings):
+    backwards = head_first(chain, ends, source.time_s, tracks, frequency, lag, options.head_marker, warnings)
+    if backwards and symmetric(chain):
         tracks = np.ascontiguousarray(tracks[:, ::-1])
+    elif backwards:
+        warnings.append("the markers' spacing says which end is the tail, and their motion says otherwise")
     start, start_sd = _valve_start(source, row, robot, tracks, options, schedule, warnings)
     if start < source.time_s[0] - 0.5 / source.rate_hz:
         warnings.append(
             f"the take begins {source.time_s[0] - start:.3g} s after the valves: "
             "calibrate and discrepancy take the robot for straight and at rest when they start"
         )
-    trial = _cut(source, row, tracks, start, report, schedule)
-    _check_rest(trial, warnings)
-    _check_turn(trial, warnings)
+    trial = cut_trial(source, row, chain, tracks, start, report, schedule)
+    check_rest(trial, warnings)
+    check_turn(trial, warnings)
     ghosts = seen - int((owners >= 0).sum())
     note = TrialNote(trial.name, source.name, start, start_sd, trial.lost_fraction, ghosts, tuple(warnings))
     return trial, note
 
 
 def _points(source: Take, chain: Chain, options: ImportOptions) -> tuple[tuple[str, ...], Array]:
-    bodies = options.points == "bodies" or (options.points == "auto" and len(source.bodies) == chain.links)
+    bodies = options.points == "bodies" or (options.points == "auto" and len(source.bodies) == chain.markers)
     labels = source.bodies if bodies else source.markers
     positions = source.body_positions if bodies else source.marker_positions
-    if len(labels) < chain.links or positions is None:
+    if len(labels) < chain.markers or positions is None:
         kind = "rigid bodies" if bodies else "markers"
         raise InputError(
-            f"{source.source}: holds {len(labels)} {kind}, the robot has {chain.links} links "
-            "(one marker on the centre of every link is needed)"
+            f"{source.source}: holds {len(labels)} {kind}, {_expected(chain)}; "
+            "say with --markers where they sit"
         )
     return labels, positions
+
+
+def _expected(chain: Chain) -> str:
+    """Return how many markers there should be, in words."""
+    if chain.spots is None:
+        return f"the robot has {chain.links} links (one marker on the centre of each is expected)"
+    return f"--markers lists {chain.markers}"
 
 
 def _scaled(
@@ -263,8 +275,10 @@ def _scaled(
             if unit:
                 warnings.append(f"the file states no units: taken as {unit}, for the markers' spacing")
             return cloud, found
+    spacing = sorted({float(f"{d:.3g}") for d in chain.spacing_m})
     raise InputError(
-        f"{source.source}: no frame shows {chain.links} markers in a row, {chain.pitch_m:g} m apart "
+        f"{source.source}: no frame shows {chain.markers} markers in a row, "
+        f"{' or '.join(f'{d:g}' for d in spacing[:4])} m apart "
         f"(is it this robot, are the units right, is the ground plane seen from above?)"
     )
 
@@ -274,7 +288,7 @@ def _pixels(chain: Chain, positions: Array) -> str:
     chords = np.linalg.norm(np.diff(positions, axis=1), axis=2)
     if not np.isfinite(chords).any():
         return ""
-    scale = chain.pitch_m / float(np.nanquantile(chords, 0.9))
+    scale = float(chain.spacing_m.max()) / float(np.nanquantile(chords, 0.9))
     return f" per pixel (from the markers' spacing it would be about {scale:.2g}; better from a ruler)"
 
 
@@ -297,75 +311,12 @@ def _valve_start(
     if schedule is not None:
         values[0] = 1 / schedule.period_s
     onset = find_onset(
-        robot, Gait(values[0], values[1], values[2], values[3], schedule), source.time_s, tracks
+        robot,
+        Gait(values[0], values[1], values[2], values[3], schedule),
+        source.time_s,
+        tracks,
+        options.spots,
     )
     if onset.doubt:
         warnings.append(f"{onset.doubt}: the start is known from the first motion alone; give valve_start_s")
     return onset.time_s, onset.sd_s
-
-
-def _cut(
-    source: Take, row: Row, tracks: Array, start: float, report: Report, schedule: Schedule | None
-) -> Trial:
-    """Cut the trial out of the take: from the valves' start, tail at the origin, room axes kept."""
-    step = 1 / source.rate_hz
-    time = source.time_s - start
-    duration = row.number("duration_s", report, math.inf)
-    window = (time >= -0.5 * step) & (time < duration - 0.5 * step)
-    if window.sum() < 4:
-        raise InputError(f"{source.source}: the valves start at {start:g} s, after the take's end")
-    rest = tracks[source.time_s <= max(start, source.time_s[4])]
-    seen = np.isfinite(rest[..., 0]).any(axis=0)
-    if not seen[[0, -1]].all():
-        raise InputError(f"{source.source}: tail or head is not seen before the valves start")
-    tail, head = (np.nanmedian(rest[:, i], axis=0) for i in (0, -1))
-    heading = math.atan2(head[1] - tail[1], head[0] - tail[0])
-    values = {name: row.number(name, report, 0.0) for name in SETTINGS}
-    if schedule is not None and values["frequency_hz"] <= 0:
-        values["frequency_hz"] = 1 / schedule.period_s
-    return Trial(
-        name=row.text("trial"),
-        frequency_hz=values["frequency_hz"],
-        pressure_kpa=values["pressure_kpa"],
-        offset=values["offset"],
-        phase_lag_rad=values["phase_lag_rad"],
-        heading_rad=heading,
-        duration_s=round(float(time[window][-1]) + step, 6),
-        time_s=time[window],
-        markers_m=tracks[window] - tail,
-        schedule=schedule,
-        tether=row.yes("tether", True, report),
-        floor=row.text("floor") or None,
-        replicate_of=row.text("replicate_of") or None,
-        kind=row.text("kind") or "gait",
-    )
-
-
-def _check_rest(trial: Trial, warnings: list[str]) -> None:
-    """The fits take a robot for straight and at rest when its valves start."""
-    points = trial.markers_m
-    if points is None or trial.kind != "gait":
-        return
-    chords = np.diff(points[:3], axis=1)
-    angle = np.arctan2(chords[..., 1], chords[..., 0])
-    bends = np.abs(np.mod(np.diff(angle, axis=1) + np.pi, 2 * np.pi) - np.pi)
-    if np.isfinite(bends).any() and float(np.nanmax(bends)) > MOST_BENT_RAD:
-        warnings.append(
-            f"the robot is bent by {np.nanmax(bends):.2g} rad at the valves' start: the fits "
-            "take it for straight and at rest then (a take that begins in mid-gait does not fit)"
-        )
-
-
-def _check_turn(trial: Trial, warnings: list[str]) -> None:
-    """A positive offset turns left: a robot that turns the other way was seen from below."""
-    points = trial.markers_m
-    if points is None or abs(trial.offset) < 0.15 or trial.kind != "gait":
-        return
-    axis = points[:, -1] - points[:, 0]
-    angle = np.arctan2(axis[:, 1], axis[:, 0])
-    angle = np.unwrap(angle[np.isfinite(angle)])
-    turned = (
-        float(angle[-len(angle) // 4 :].mean() - angle[: len(angle) // 4].mean()) if len(angle) > 8 else 0.0
-    )
-    if abs(turned) > 0.2 and turned * trial.offset < 0:
-        warnings.append("turns against its offset: is the plane seen from above (--up), head and tail right?")

@@ -27,10 +27,10 @@ class MendedLabels:
 
     Attributes
     ----------
-    markers_m : ndarray, shape (T, N, 2)
+    markers_m : ndarray, shape (T, M, 2)
     swapped : ndarray of bool, shape (T,)
         Frames whose labels were permuted.
-    dropped : ndarray of bool, shape (T, N)
+    dropped : ndarray of bool, shape (T, M)
         Positions (by their old label) that fit no link, reflections for instance, and were taken out.
     """
 
@@ -45,7 +45,7 @@ def mend_labels(chain: Chain, markers_m: Array) -> MendedLabels:
     Parameters
     ----------
     chain : Chain
-    markers_m : ndarray, shape (T, N, 2)
+    markers_m : ndarray, shape (T, M, 2)
         Tail to head, NaN where lost. The first frame that shows most markers must be in order.
     """
     points = np.asarray(markers_m, dtype=float)
@@ -56,9 +56,9 @@ def mend_labels(chain: Chain, markers_m: Array) -> MendedLabels:
     start = next((k for k in np.flatnonzero(counts == counts.max()) if fits_chain(chain, points[k])), None)
     if start is None:
         return MendedLabels(points, *calm)
-    owners = follow(chain, points, int(start), np.arange(chain.links))
+    owners = follow(chain, points, int(start), np.arange(chain.markers))
     mended = take(points, owners)
-    own = np.arange(chain.links)
+    own = np.arange(chain.markers)
     swapped = ((owners >= 0) & (owners != own)).any(axis=1)
     used = (owners[:, :, None] == own).any(axis=1)
     return MendedLabels(mended, swapped, np.isfinite(points[..., 0]) & ~used)
@@ -71,18 +71,23 @@ def _suspicious(chain: Chain, points: Array) -> bool:
         if len(seen) and (np.linalg.norm(np.diff(seen, axis=0), axis=1) > NEAR * chain.pitch_m).any():
             return True
     chords = np.linalg.norm(np.diff(points, axis=1), axis=2)
-    return bool((chords[np.isfinite(chords)] > SLACK * chain.pitch_m).any())
+    return bool((chords > SLACK * chain.spacing_m).any())  # not so where one of two was lost
 
 
 def fits_chain(chain: Chain, frame: Array) -> bool:
-    """Whether no two seen links lie farther apart than the chain between them is long."""
+    """Whether no two seen markers lie farther apart than the chain between them is long."""
+    return bool(np.all(_stretch(chain, frame)[1] <= SLACK))
+
+
+def _stretch(chain: Chain, frame: Array) -> tuple[np.ndarray, Array]:
+    """Return the markers seen, and how far each lies from the next, over their distance when straight."""
     seen = np.flatnonzero(np.isfinite(frame[:, 0]))
     chords = np.linalg.norm(np.diff(frame[seen], axis=0), axis=1)
-    return bool(np.all(chords <= SLACK * chain.pitch_m * np.diff(seen)))
+    return seen, chords / np.linalg.norm(np.diff(chain.straight_m[seen], axis=0), axis=1)
 
 
 def take(cloud: Array, owners: np.ndarray) -> Array:
-    """Return the links' positions, shape (T, N, 2), given which position each link owns (-1: none)."""
+    """Return the links' positions, shape (T, M, 2), given which position each link owns (-1: none)."""
     frames = np.arange(len(cloud))[:, None]
     positions = cloud[frames, np.maximum(owners, 0)]
     return np.where((owners >= 0)[..., None], positions, np.nan)
@@ -98,14 +103,14 @@ def follow(chain: Chain, cloud: Array, start: int, order: np.ndarray) -> np.ndar
         All positions seen, in any order; NaN where there is none.
     start : int
         Frame in which link i owns position ``order[i]`` (-1: not seen there).
-    order : ndarray of int, shape (N,)
+    order : ndarray of int, shape (M,)
 
     Returns
     -------
-    owners : ndarray of int, shape (T, N)
+    owners : ndarray of int, shape (T, M)
         Position that each link owns in each frame, -1 where it was lost.
     """
-    owners = np.full((len(cloud), chain.links), -1)
+    owners = np.full((len(cloud), chain.markers), -1)
     owners[start] = np.where(np.isfinite(cloud[start, np.maximum(order, 0), 0]), order, -1)
     first = take(cloud[start : start + 1], owners[start : start + 1])[0]
     for frames in (range(start + 1, len(cloud)), range(start - 1, -1, -1)):
@@ -121,11 +126,11 @@ def follow(chain: Chain, cloud: Array, start: int, order: np.ndarray) -> np.ndar
 def _found_again(chain: Chain, positions: Array, last: Array, age: np.ndarray) -> np.ndarray:
     """Find the whole chain anew after frames in which it was lost: it has moved on, by a link perhaps."""
     known = np.isfinite(last[:, 0])
-    if age.min() < BLIND or np.isfinite(positions[:, 0]).sum() < chain.links or known.sum() < 2:
-        return np.full(chain.links, -1)
+    if age.min() < BLIND or np.isfinite(positions[:, 0]).sum() < chain.markers or known.sum() < 2:
+        return np.full(chain.markers, -1)
     order = find_chain(chain, positions)
     if order is None:
-        return np.full(chain.links, -1)
+        return np.full(chain.markers, -1)
     axis = last[known][-1] - last[known][0]
     return order if (positions[order[-1]] - positions[order[0]]) @ axis > 0 else order[::-1]
 
@@ -153,10 +158,9 @@ def _without_strays(chain: Chain, positions: Array, owners: np.ndarray) -> np.nd
     """Take out the position that makes neighbours too far apart (a reflection close to a lost marker)."""
     links = np.where((owners >= 0)[:, None], positions[np.maximum(owners, 0)], np.nan)
     while not fits_chain(chain, links):
-        seen = np.flatnonzero(np.isfinite(links[:, 0]))
+        seen, excess = _stretch(chain, links)
         if len(seen) < 3:
             break
-        excess = np.linalg.norm(np.diff(links[seen], axis=0), axis=1) / np.diff(seen)
         blame = np.zeros(len(seen))
         blame[:-1] += excess
         blame[1:] += excess

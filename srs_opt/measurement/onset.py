@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from srs_opt.errors import NoAnswerError
-from srs_opt.measurement.chain import Chain, chain_of, link_positions
+from srs_opt.measurement.chain import Chain, chain_of, marker_positions
 from srs_opt.measurement.records import Array, Schedule
+from srs_opt.measurement.spots import Spots
 from srs_opt.measurement.steps import step_response
 from srs_opt.robot import Robot
 
@@ -77,7 +78,9 @@ def noise_sd(points_m: Array) -> float:
     return float(np.median(np.abs(third)) / 0.6745 / np.sqrt(20)) if len(third) else 0.0
 
 
-def find_onset(robot: Robot, gait: Gait, time_s: Array, markers_m: Array) -> Onset:
+def find_onset(
+    robot: Robot, gait: Gait, time_s: Array, markers_m: Array, spots: Spots | None = None
+) -> Onset:
     """Fit the shapes of the first cycles with those that the valve wave gives, whatever way the robot moves.
 
     Fitted are the start and factors on C0 and on the time constants; position and heading are free in every
@@ -92,8 +95,10 @@ def find_onset(robot: Robot, gait: Gait, time_s: Array, markers_m: Array) -> Ons
     gait : Gait
         What the valves were told to do.
     time_s : ndarray, shape (T,)
-    markers_m : ndarray, shape (T, N, 2)
-        Tracks, tail to head, that begin before the motion does.
+    markers_m : ndarray, shape (T, M, 2)
+        Tracks, in the order of `spots`, that begin before the motion does.
+    spots : tuple of Spot, optional
+        Where the markers sit; default on every link's centre.
 
     Raises
     ------
@@ -113,7 +118,7 @@ def find_onset(robot: Robot, gait: Gait, time_s: Array, markers_m: Array) -> Ons
     window = (time_s > centre - 2 * settle) & (time_s < centre + CYCLES / gait.frequency_hz)
     time, points = time_s[window], markers_m[window]
     z = points[..., 0] + 1j * points[..., 1]
-    chain = chain_of(robot)
+    chain = chain_of(robot, spots)
 
     def gaps(p: Array) -> Array:
         kappa = p[1] * first_curvatures(robot, gait, time - p[0], p[2])
@@ -155,7 +160,7 @@ def _correlated(residual: Array, frames: int) -> float:
 def _shape_gaps(chain: Chain, kappa: Array, z: NDArray[np.complex128]) -> Array:
     """Return seen minus modelled positions after the best turn and shift of every frame, flat."""
     q = np.concatenate([np.zeros((len(kappa), 3)), kappa], axis=1)
-    model = link_positions(chain, q)
+    model = marker_positions(chain, q)
     seen = np.isfinite(z)
     count = np.maximum(seen.sum(axis=1, keepdims=True), 1)
     z = np.where(seen, z, 0.0)

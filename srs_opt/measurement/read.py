@@ -13,6 +13,7 @@ from srs_opt.gait_file import SCHEDULE_COLUMNS
 from srs_opt.measurement.applied import FOLDER as APPLIED_FOLDER
 from srs_opt.measurement.applied import read_applied
 from srs_opt.measurement.bench_files import read_bench, read_maps
+from srs_opt.measurement.chain import chain_of
 from srs_opt.measurement.plausible import check_robot, check_trial_row
 from srs_opt.measurement.records import (
     CENTRE_OF_MASS,
@@ -23,6 +24,7 @@ from srs_opt.measurement.records import (
     Schedule,
     Trial,
 )
+from srs_opt.measurement.spots import Spots, spots_of
 from srs_opt.measurement.tracks import check_track, read_track
 from srs_opt.problem import Report
 from srs_opt.robot import Robot, robot_from_document, robot_problems, wpi_srs
@@ -49,6 +51,7 @@ class Header:
     rate_hz: float
     marker_sd_m: float
     markers: str
+    spots: Spots | None = None
 
 
 def read_folder(folder: Path, report: Report) -> DataSet | None:
@@ -92,12 +95,18 @@ def _read_header(folder: Path, report: Report) -> Header:
     robot = _read_robot(folder, str(record.get("robot", "robot.yaml")), fields, report)
     rate = fields.number(("camera", "rate_hz"), 1e-3, 1e5, "frames per second")
     sd = fields.number(("camera", "marker_sd_m"), 1e-9, robot.pitch_m / 3, "metres (found millimetres?)")
-    markers = record.get("markers", TAIL_TO_HEAD)
-    if markers not in MARKER_ORDERS:
-        fields.error(("markers",), f"must be one of {', '.join(MARKER_ORDERS)}, found {str(markers)[:40]!r}")
+    markers, spots = record.get("markers", TAIL_TO_HEAD), None
+    if isinstance(markers, list):
+        found, problems = spots_of(document, ("markers",), robot.links)
+        for problem in problems:
+            report.add_input_error(file, problem)
+        markers, spots = TAIL_TO_HEAD, found or None
+    elif markers not in MARKER_ORDERS:
+        words = f"must be a list of places, or one of {', '.join(MARKER_ORDERS)}"
+        fields.error(("markers",), f"{words}, found {str(markers)[:40]!r}")
         markers = TAIL_TO_HEAD
     name = record.get("name", folder.resolve().name)
-    return Header(str(name), robot, rate, sd, str(markers))
+    return Header(str(name), robot, rate, sd, str(markers), spots)
 
 
 class _Fields:
@@ -198,7 +207,7 @@ def _read_trial(
     if not (folder / file).is_file():
         report.error(row.file, row.line, f"trial '{name}' is listed and {file} is missing")
         return None
-    track = read_track(file, header.markers, header.robot.links, report)
+    track = read_track(file, header.markers, chain_of(header.robot, header.spots), report)
     if track is None:
         return None
     trial = Trial(
@@ -213,6 +222,7 @@ def _read_trial(
         floor=row.text("floor") or None,
         replicate_of=row.text("replicate_of") or None,
         kind=kind,
+        spots=header.spots,
     )
     check_track(trial, track, header.robot, header.rate_hz, header.marker_sd_m, report)
     return trial

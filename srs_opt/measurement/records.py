@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
+    from srs_opt.measurement.spots import Spots
     from srs_opt.robot import Robot
 
 Array = NDArray[np.float64]
@@ -84,8 +85,8 @@ class Trial:
         Columns of trials.csv; what does not apply to the kind of trial is 0.
     time_s : ndarray, shape (T,)
         Time labels of the camera; the first sample is labelled 0.
-    markers_m : ndarray, shape (T, N, 2), or None
-        Marker positions, tail to head; NaN where a marker was lost.
+    markers_m : ndarray, shape (T, M, 2), or None
+        Marker positions, tail to head or in the order of `spots`; NaN where a marker was lost.
     centre_m : ndarray, shape (T, 2), or None
         Centre of mass, where the set records that alone.
     schedule : Schedule or None
@@ -100,6 +101,8 @@ class Trial:
         Trial that this one repeats.
     kind : {"gait", "tow", "push", "step", "still"}
         What was done.
+    spots : tuple of Spot or None
+        Where the markers sit; None: one on every link's centre.
     """
 
     name: str
@@ -118,6 +121,7 @@ class Trial:
     floor: str | None = None
     replicate_of: str | None = None
     kind: str = "gait"
+    spots: Spots | None = None
 
     @property
     def period_s(self) -> float:
@@ -212,6 +216,7 @@ class DataSet:
     rate_hz, marker_sd_m : float
         Frame rate of the camera, standard deviation of a marker coordinate.
     markers : {"tail_to_head", "centre_of_mass"}
+        What the tracks hold; other places of markers than the links' centres stand with the trials.
     trials : tuple of Trial
     maps : tuple of MapRow
     bench : Bench

@@ -12,8 +12,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from srs_opt.errors import InputError
-from srs_opt.measurement.chain import Chain, chain_of, link_positions, position_jacobian
+from srs_opt.measurement.chain import (
+    Chain,
+    chain_of,
+    headings,
+    link_positions,
+    marker_jacobian,
+    marker_positions,
+)
 from srs_opt.measurement.records import Array
+from srs_opt.measurement.spots import Spots
 from srs_opt.robot import Robot
 
 PRIOR_BEND_RAD = 0.5
@@ -63,29 +71,36 @@ class Shape:
 
 
 def shape_from_markers(
-    robot: Robot, markers_m: Array, marker_sd_m: float, prior_sd_1_m: float | None = None
+    robot: Robot,
+    markers_m: Array,
+    marker_sd_m: float,
+    prior_sd_1_m: float | None = None,
+    spots: Spots | None = None,
 ) -> Shape:
     """Fit pose and curvatures to each frame.
 
     Parameters
     ----------
     robot : Robot
-    markers_m : ndarray, shape (T, N, 2)
-        Tail to head, NaN where lost (put swapped labels right first, `srs_opt.measurement.labels`).
+    markers_m : ndarray, shape (T, M, 2)
+        In the order of `spots`, NaN where lost; swapped labels are put right first
+        (`srs_opt.measurement.labels`).
     marker_sd_m : float
         Standard deviation of a coordinate.
     prior_sd_1_m : float, optional
         Standard deviation of the weak prior on curvature; default half a radian of bend per segment.
+    spots : tuple of Spot, optional
+        Where the markers sit; default on every link's centre, tail to head.
 
     Raises
     ------
     InputError
         If the array does not fit the robot or holds no position at all.
     """
-    chain = chain_of(robot)
+    chain = chain_of(robot, spots)
     points = np.asarray(markers_m, dtype=float)
-    if points.ndim != 3 or points.shape[1:] != (chain.links, 2):
-        raise InputError(f"markers of shape {points.shape}: expected (frames, {chain.links}, 2)")
+    if points.ndim != 3 or points.shape[1:] != (chain.markers, 2):
+        raise InputError(f"markers of shape {points.shape}: expected (frames, {chain.markers}, 2)")
     if not np.isfinite(points).any():
         raise InputError("every marker is lost in every frame: there is no shape to find")
     if prior_sd_1_m is None:
@@ -101,14 +116,14 @@ def shape_from_markers(
 
 
 def residuals(chain: Chain, points: Array, q: Array) -> Array:
-    """Return measured minus modelled coordinates, zero where lost, shape (T, 2 N)."""
-    gap = points - link_positions(chain, q)
+    """Return measured minus modelled coordinates, zero where lost, shape (T, 2 M)."""
+    gap = points - marker_positions(chain, q)
     return np.where(np.isfinite(gap), gap, 0.0).reshape(len(points), -1)
 
 
 def _normal_equations(chain: Chain, points: Array, sd: float, q: Array) -> tuple[Array, Array]:
     """Return J^T J / sd^2, shape (T, n, n), and J^T residual / sd^2, shape (T, n), over the seen markers."""
-    jacobian = position_jacobian(chain, q) * np.isfinite(points)[..., None]
+    jacobian = marker_jacobian(chain, q) * np.isfinite(points)[..., None]
     jacobian = jacobian.reshape(len(points), -1, chain.unknowns)
     transposed = jacobian.transpose(0, 2, 1) / sd**2
     return transposed @ jacobian, (transposed @ residuals(chain, points, q)[..., None])[..., 0]
@@ -146,39 +161,70 @@ def _levenberg_marquardt(
 def first_guess(chain: Chain, points: Array) -> Array:
     """Return configurations that match the chords' directions with the least curvature, shape (T, N + 2).
 
-    A chord points along the mean heading of its two links, whatever the gap: N-1 linear equations for N
-    headings, the missing one being the least sum of squared curvatures.
+    A chord between two places of the centre line points along the mean heading between them, to first order:
+    M-1 linear equations for N headings, the missing ones being those of the least sum of squared curvatures.
     """
-    filled = _fill(chain, points)
+    filled, along = _on_centre_line(chain, _fill(chain, points))
     chords = np.diff(filled, axis=1)
     direction = np.unwrap(np.arctan2(chords[..., 1], chords[..., 0]), axis=1)
-    turns = np.diff(direction, axis=1)
-    n = chain.links
-    mean_of_pairs = (np.eye(n - 2, n - 1) + np.eye(n - 2, n - 1, 1)) * chain.segment_length_m / 2
-    curvature = turns @ np.linalg.pinv(mean_of_pairs).T
-    relative = np.column_stack([np.zeros(len(turns)), np.cumsum(curvature * chain.segment_length_m, axis=1)])
-    pairs = (relative[:, :-1] + relative[:, 1:]) / 2
-    heading = (direction - pairs).mean(axis=1) + relative.mean(axis=1)
-    return np.column_stack([filled.mean(axis=1), np.unwrap(heading), curvature])
+    turned = _turned(chain, along)
+    curvature = np.diff(direction, axis=1) @ np.linalg.pinv(np.diff(turned, axis=0)).T
+    tail = (direction - curvature @ turned.T).mean(axis=1)
+    q = np.column_stack([np.zeros((len(filled), 2)), np.zeros(len(filled)), curvature])
+    q[:, 2] = np.unwrap(tail - headings(chain, q)[:, 0])
+    q[:, :2] = (filled - _line_positions(chain, q, along)).mean(axis=1)
+    return q
+
+
+def _on_centre_line(chain: Chain, filled: Array) -> tuple[Array, Array]:
+    """Return the means of markers at one place along the robot, in order, and the places, m from the tail."""
+    along = np.round(chain.straight_m[:, 0], 4)
+    places = np.unique(along)
+    means = np.stack([filled[:, along == place].mean(axis=1) for place in places], axis=1)
+    return means, places
+
+
+def _turned(chain: Chain, along: Array) -> Array:
+    """Return by how much curvatures turn the chord from each place to the next against the tail, (K-1, N-1).
+
+    That is the mean, between the places, of the way gone through each chamber.
+    """
+    starts = np.arange(chain.links - 1) * chain.pitch_m + chain.gap_length_m / 2
+    l = chain.segment_length_m
+
+    def integral(s: Array) -> Array:  # of clip(s - start, 0, l)
+        inside = np.clip(s[:, None] - starts, 0, l)
+        return np.asarray(inside**2 / 2 + l * np.maximum(s[:, None] - starts - l, 0))
+
+    return np.asarray(np.diff(integral(along), axis=0) / np.diff(along)[:, None])
+
+
+def _line_positions(chain: Chain, q: Array, along: Array) -> Array:
+    """Return the places `along` the centre line for configurations whose centre is at the origin."""
+    links = link_positions(chain, q)
+    nodes = np.arange(chain.links) * chain.pitch_m
+    k = np.clip(np.searchsorted(nodes, along, side="right") - 1, 0, chain.links - 2)
+    share = ((along - nodes[k]) / chain.pitch_m)[:, None]
+    return np.asarray((1 - share) * links[:, k] + share * links[:, k + 1])
 
 
 def _fill(chain: Chain, points: Array) -> Array:
     """Fill lost positions for the first guess: along time, then along the chain."""
     filled = points.copy()
-    frames = np.arange(len(points))
-    for marker in range(chain.links):
+    frames, count = np.arange(len(points)), chain.markers
+    for marker in range(count):
         seen = np.isfinite(points[:, marker, 0])
         for axis in range(2) if seen.any() else ():
             filled[:, marker, axis] = np.interp(frames, frames[seen], points[seen, marker, axis])
     present = np.flatnonzero(np.isfinite(filled[0, :, 0]))
-    if len(present) == chain.links:
+    if len(present) == count:
         return filled
+    straight = chain.straight_m
     if len(present) == 1:  # nothing tells the heading: lay the chain along x
-        place = (np.arange(chain.links) - present[0]) * chain.pitch_m
-        return np.asarray(filled[:, present] + np.stack([place, 0 * place], axis=-1))
-    for marker in set(range(chain.links)) - set(present.tolist()):
+        return np.asarray(filled[:, present] + straight - straight[present])
+    for marker in set(range(count)) - set(present.tolist()):
         below, above = present[present < marker], present[present > marker]
         a, b = (below[-1], above[0]) if len(below) and len(above) else present[[0, -1]]
-        share = (marker - a) / (b - a)
+        share = (straight[marker, 0] - straight[a, 0]) / ((straight[b, 0] - straight[a, 0]) or 1.0)
         filled[:, marker] = (1 - share) * filled[:, a] + share * filled[:, b]
     return filled

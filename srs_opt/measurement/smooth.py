@@ -14,9 +14,10 @@ from typing import Any
 import numpy as np
 
 from srs_opt.errors import InputError
-from srs_opt.measurement.chain import Chain, chain_of, position_jacobian
+from srs_opt.measurement.chain import Chain, chain_of, marker_jacobian
 from srs_opt.measurement.records import Array
 from srs_opt.measurement.shape import FAR_M, FAR_RAD, PRIOR_BEND_RAD, first_guess, residuals
+from srs_opt.measurement.spots import Spots
 from srs_opt.robot import Robot
 
 START_LOG10 = (-0.5, 1.5, 5.5)  # of the intensities of position, heading, curvature
@@ -93,6 +94,7 @@ def smooth_shape(
     markers_m: Array,
     marker_sd_m: float,
     intensity: Intensity | None = None,
+    spots: Spots | None = None,
 ) -> SmoothShape:
     """Smooth the shape over a trial.
 
@@ -101,11 +103,13 @@ def smooth_shape(
     robot : Robot
     time_s : ndarray, shape (T,)
         Increasing; gaps are allowed.
-    markers_m : ndarray, shape (T, N, 2)
-        Tail to head, NaN where lost.
+    markers_m : ndarray, shape (T, M, 2)
+        In the order of `spots`, NaN where lost.
     marker_sd_m : float
     intensity : Intensity, optional
         Of the prior; found by maximum likelihood when not given (give it to smooth many trials alike).
+    spots : tuple of Spot, optional
+        Where the markers sit; default on every link's centre, tail to head.
 
     Raises
     ------
@@ -115,7 +119,7 @@ def smooth_shape(
     time, points = np.asarray(time_s, dtype=float), np.asarray(markers_m, dtype=float)
     if len(time) < 4 or not np.all(np.diff(time) > 0):
         raise InputError("smoothing needs four or more frames with increasing times")
-    problem = _Problem(chain_of(robot), time, points, marker_sd_m)
+    problem = _Problem(chain_of(robot, spots), time, points, marker_sd_m)
     if intensity is None:
         intensity = likeliest_intensity(problem)
     z, blocks = _most_probable(problem, intensity.per_component(problem.chain), _start(problem))
@@ -246,7 +250,7 @@ def _linearise(
     slope[:-1] -= (coupling @ z[1:, :, None])[..., 0]
     slope[1:] -= (coupling.transpose(0, 2, 1) @ z[:-1, :, None])[..., 0]
     slope[0] += precision * mean
-    jacobian = position_jacobian(chain, z[:, :n]) * np.isfinite(problem.points)[..., None]
+    jacobian = marker_jacobian(chain, z[:, :n]) * np.isfinite(problem.points)[..., None]
     jacobian = jacobian.reshape(len(z), -1, n)
     transposed = jacobian.transpose(0, 2, 1) / problem.sd**2
     diagonal[:, :n, :n] += transposed @ jacobian

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from srs_opt.measurement.chain import Chain, chain_of
 from srs_opt.measurement.plausible import factor_of_thousand
 from srs_opt.measurement.records import TAIL_TO_HEAD, Array, Trial
 from srs_opt.problem import Report
@@ -28,23 +29,23 @@ class Track:
     lines: tuple[int, ...] | range
 
 
-def track_columns(markers: str, links: int) -> tuple[str, ...]:
-    """Return the columns of a track file."""
+def track_columns(markers: str, count: int) -> tuple[str, ...]:
+    """Return the columns of a track file with `count` markers."""
     if markers != TAIL_TO_HEAD:
         return ("time_s", "x_m", "y_m")
-    return ("time_s", *(f"{axis}{i}_m" for i in range(1, links + 1) for axis in "xy"))
+    return ("time_s", *(f"{axis}{i}_m" for i in range(1, count + 1) for axis in "xy"))
 
 
-def read_track(file: str, markers: str, links: int, report: Report) -> Track | None:
+def read_track(file: str, markers: str, chain: Chain, report: Report) -> Track | None:
     """Read one track; None (and a report) when nothing can be made of it."""
     table = read_numbers(file, report)
     if table is None:
         if not any(p.file == file for p in report.problems):
             report.error(file, None, "holds no rows")
         return None
-    expected = track_columns(markers, links)
+    expected = track_columns(markers, chain.markers)
     if table.header != expected:
-        _report_columns(file, table, expected, markers, links, report)
+        _report_columns(file, table, expected, markers, chain, report)
         return None
     time = table.values[:, 0]
     points = np.ascontiguousarray(table.values[:, 1:].reshape(len(time), -1, 2))
@@ -69,11 +70,16 @@ def read_track(file: str, markers: str, links: int, report: Report) -> Track | N
 
 
 def _report_columns(
-    file: str, table: NumberTable, expected: tuple[str, ...], markers: str, links: int, report: Report
+    file: str, table: NumberTable, expected: tuple[str, ...], markers: str, chain: Chain, report: Report
 ) -> None:
     found = (len(table.header) - 1) / 2
-    if markers == TAIL_TO_HEAD and found == int(found) and found != links:
-        report.error(file, 1, f"has {int(found)} markers where the robot has {links} links (robot.yaml)")
+    if markers == TAIL_TO_HEAD and found == int(found) and found != chain.markers:
+        why = (
+            f"the robot has {chain.links} links (robot.yaml)"
+            if chain.spots is None
+            else f"dataset.yaml lists {chain.markers}"
+        )
+        report.error(file, 1, f"has {int(found)} markers where {why}")
         return
     for name in expected:
         if name not in table.header:
@@ -100,9 +106,10 @@ def check_track(
     if lost.mean() > 0.2:
         report.warn(track.file, None, f"{100 * lost.mean():.0f} % of the marker positions are lost")
     if track.points_m.shape[1] > 1:
-        good_units = _check_spacing(track, robot, report)
+        chain = chain_of(robot, trial.spots)
+        good_units = _check_spacing(track, chain, report)
         if good_units:
-            _check_start(trial, track, robot, report)
+            _check_start(trial, track, chain, robot.length_m, report)
     else:
         good_units = _check_speed(track, robot, good_clock, report)
     if good_units:
@@ -165,14 +172,15 @@ def _check_duration(trial: Trial, span: float, step: float, file: str, line: int
         report.warn(file, line, message)
 
 
-def _check_spacing(track: Track, robot: Robot, report: Report) -> bool:
+def _check_spacing(track: Track, chain: Chain, report: Report) -> bool:
     chords = np.linalg.norm(np.diff(track.points_m, axis=1), axis=2)
     if np.isnan(chords).all():
         return True
-    ratio = float(np.nanquantile(chords, 0.75)) / robot.pitch_m
+    ratio = float(np.nanquantile(chords / chain.spacing_m, 0.75))
     if 0.6 < ratio < 1.5:
         return True
-    pitch, found = robot.pitch_m, ratio * robot.pitch_m
+    spacing = float(chain.spacing_m.mean())
+    found = ratio * spacing
     scale = factor_of_thousand(ratio)
     units = {"milli": "millimetres", "kilo": "kilometres", "micro": "micrometres"}
     if scale:
@@ -183,12 +191,13 @@ def _check_spacing(track: Track, robot: Robot, report: Report) -> bool:
         why = "positions in inches, expected metres?"
     else:
         why = "are the markers in order, tail to head, and is it this robot?"
-    message = f"neighbouring markers lie {found:.3g} m apart where the robot's pitch is {pitch:.3g} m: {why}"
+    whose = "the robot's pitch is" if chain.spots is None else "robot and markers say"
+    message = f"neighbouring markers lie {found:.3g} m apart where {whose} {spacing:.3g} m: {why}"
     report.error(track.file, track.lines[0], message)
     return False
 
 
-def _check_start(trial: Trial, track: Track, robot: Robot, report: Report) -> None:
+def _check_start(trial: Trial, track: Track, chain: Chain, length_m: float, report: Report) -> None:
     """The robot starts straight along heading_rad with its tail at the origin."""
     points = track.points_m
     tail, head = points[:10, 0], points[:10, -1]
@@ -196,15 +205,19 @@ def _check_start(trial: Trial, track: Track, robot: Robot, report: Report) -> No
         return
     start = np.nanmean(tail, axis=0)
     along = np.nanmean(head, axis=0) - start
-    gap = math.remainder(math.atan2(along[1], along[0]) - trial.heading_rad, 2 * math.pi)
-    degrees = math.remainder(math.atan2(along[1], along[0]) - math.radians(trial.heading_rad), 2 * math.pi)
+    straight = chain.straight_m[-1] - chain.straight_m[0]
+    heading = math.atan2(along[1], along[0]) - math.atan2(straight[1], straight[0])
+    gap = math.remainder(heading - trial.heading_rad, 2 * math.pi)
+    degrees = math.remainder(heading - math.radians(trial.heading_rad), 2 * math.pi)
+    c, s = math.cos(heading), math.sin(heading)
+    start = start - np.array([[c, -s], [s, c]]) @ chain.straight_m[0]
     if abs(gap) > 2.9 and abs(degrees) > 0.2:
         report.error(track.file, track.lines[0], "the markers run head to tail, expected tail to head")
     elif abs(gap) > 0.2:
         hint = " (given in degrees?)" if abs(degrees) < 0.2 else ""
         message = f"the robot starts {gap:+.2f} rad away from its heading_rad {trial.heading_rad:g}{hint}"
         report.warn(track.file, track.lines[0], message)
-    if np.linalg.norm(start) > robot.length_m:
+    if np.linalg.norm(start) > length_m:
         message = f"the tail starts at ({start[0]:.3g}, {start[1]:.3g}) m, expected the origin"
         report.warn(track.file, track.lines[0], message)
 

@@ -1,0 +1,99 @@
+"""A trial cut out of a take: on the valves' clock, tail at the origin."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from srs_opt.errors import InputError
+from srs_opt.measurement.chain import Chain
+from srs_opt.measurement.records import Array, Schedule, Trial
+from srs_opt.measurement.takes.take import Take
+from srs_opt.problem import Report
+from srs_opt.table import Row
+
+SETTINGS = ("frequency_hz", "pressure_kpa", "offset", "phase_lag_rad")
+MOST_BENT_RAD = 0.15  # between neighbouring chords at the start; wheels stick, so a few degrees stay at rest
+
+
+def cut_trial(
+    source: Take,
+    row: Row,
+    chain: Chain,
+    tracks: Array,
+    start: float,
+    report: Report,
+    schedule: Schedule | None,
+) -> Trial:
+    """Cut the trial out of the take: from the valves' start, tail at the origin, room axes kept."""
+    step = 1 / source.rate_hz
+    time = source.time_s - start
+    duration = row.number("duration_s", report, math.inf)
+    window = (time >= -0.5 * step) & (time < duration - 0.5 * step)
+    if window.sum() < 4:
+        raise InputError(f"{source.source}: the valves start at {start:g} s, after the take's end")
+    rest = tracks[source.time_s <= max(start, source.time_s[4])]
+    seen = np.isfinite(rest[..., 0]).any(axis=0)
+    if not seen[[0, -1]].all():
+        raise InputError(f"{source.source}: tail or head is not seen before the valves start")
+    tail, heading = _resting_pose(chain, np.stack([np.nanmedian(rest[:, i], axis=0) for i in (0, -1)]))
+    values = {name: row.number(name, report, 0.0) for name in SETTINGS}
+    if schedule is not None and values["frequency_hz"] <= 0:
+        values["frequency_hz"] = 1 / schedule.period_s
+    return Trial(
+        name=row.text("trial"),
+        frequency_hz=values["frequency_hz"],
+        pressure_kpa=values["pressure_kpa"],
+        offset=values["offset"],
+        phase_lag_rad=values["phase_lag_rad"],
+        heading_rad=heading,
+        duration_s=round(float(time[window][-1]) + step, 6),
+        time_s=time[window],
+        markers_m=tracks[window] - tail,
+        schedule=schedule,
+        tether=row.yes("tether", True, report),
+        floor=row.text("floor") or None,
+        replicate_of=row.text("replicate_of") or None,
+        kind=row.text("kind") or "gait",
+        spots=chain.spots,
+    )
+
+
+def _resting_pose(chain: Chain, ends: Array) -> tuple[Array, float]:
+    """Return where the straight robot's tail link is and its heading, from the outermost markers (2, 2)."""
+    straight = chain.straight_m[[0, -1]]
+    along, own = ends[1] - ends[0], straight[1] - straight[0]
+    heading = math.atan2(along[1], along[0]) - math.atan2(own[1], own[0])
+    c, s = math.cos(heading), math.sin(heading)
+    return ends[0] - np.array([[c, -s], [s, c]]) @ straight[0], math.remainder(heading, 2 * math.pi)
+
+
+def check_rest(trial: Trial, warnings: list[str]) -> None:
+    """The fits take a robot for straight and at rest when its valves start."""
+    points = trial.markers_m
+    if points is None or trial.kind != "gait":
+        return
+    chords = np.diff(points[:3], axis=1)
+    angle = np.arctan2(chords[..., 1], chords[..., 0])
+    bends = np.abs(np.mod(np.diff(angle, axis=1) + np.pi, 2 * np.pi) - np.pi)
+    if np.isfinite(bends).any() and float(np.nanmax(bends)) > MOST_BENT_RAD:
+        warnings.append(
+            f"the robot is bent by {np.nanmax(bends):.2g} rad at the valves' start: the fits "
+            "take it for straight and at rest then (a take that begins in mid-gait does not fit)"
+        )
+
+
+def check_turn(trial: Trial, warnings: list[str]) -> None:
+    """A positive offset turns left: a robot that turns the other way was seen from below."""
+    points = trial.markers_m
+    if points is None or abs(trial.offset) < 0.15 or trial.kind != "gait":
+        return
+    axis = points[:, -1] - points[:, 0]
+    angle = np.arctan2(axis[:, 1], axis[:, 0])
+    angle = np.unwrap(angle[np.isfinite(angle)])
+    turned = (
+        float(angle[-len(angle) // 4 :].mean() - angle[: len(angle) // 4].mean()) if len(angle) > 8 else 0.0
+    )
+    if abs(turned) > 0.2 and turned * trial.offset < 0:
+        warnings.append("turns against its offset: is the plane seen from above (--up), head and tail right?")
