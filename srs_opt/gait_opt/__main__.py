@@ -75,9 +75,21 @@ def build_parser() -> Parser:
 
 def _add_limits(parser: Parser) -> None:
     add = parser.add_argument_group("limits").add_argument
-    two = {"nargs": 2, "type": positive_float}
-    add("--frequency", **two, default=(1.0, 2.0), metavar=("LO", "HI"), help="Hz (default 1 2)")  # type: ignore[arg-type]
-    add("--pressure", **two, metavar=("LO", "HI"), help="kPa (default 41 55; for --table 20 55)")  # type: ignore[arg-type]
+    add(
+        "--frequency",
+        nargs=2,
+        type=positive_float,
+        default=(1.0, 2.0),
+        metavar=("LO", "HI"),
+        help="Hz (default 1 2)",
+    )
+    add(
+        "--pressure",
+        nargs=2,
+        type=finite_float,
+        metavar=("LO", "HI"),
+        help="kPa (default 41 55; for --table 20 55)",
+    )
     add("--max-curvature", type=positive_float, metavar="1_M", help="largest curvature, 1/m")
     add(
         "--min-dwell",

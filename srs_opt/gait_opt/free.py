@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from srs_opt.errors import NoAnswerError
+from srs_opt.errors import InputError, NoAnswerError
 from srs_opt.gait import Gait
 from srs_opt.gait_opt.collocation.guess import unknowns_from_orbits
 from srs_opt.gait_opt.collocation.layout import PRESSURE_UNIT_KPA, Mesh
@@ -37,41 +37,55 @@ class Relaxation:
 
 
 @dataclass(frozen=True)
+class Repeated:
+    """The best wave at `repeats` times the frequency, which K >= `repeats` pulses per cycle can play."""
+
+    repeats: int
+    frequency_hz: float
+    speed_m_s: float
+
+
+@dataclass(frozen=True)
 class FreeResult:
     """What freeing the valves brought.
 
     Attributes
     ----------
     found : Found
-        The better of wave and rounded gait, with its certificate.
-    wave_m_s : float
-        Speed of the wave gait.
-    rounded : Found or None
-        The best gait with K intervals (None: none was found).
+        The best gait with at most K intervals, waves included, with its certificate.
+    waves : tuple of Repeated
+        Once, twice ... K times per cycle, as far as dwell times allow; the first is the wave itself.
+    free : Found or None
+        The best gait that was not merely a repeated wave when its optimization began (None: none was found).
     rounded_intervals : tuple of int
         Intervals per segment after rounding, before any were added to make K.
-    relaxation : Relaxation
+    relaxation : Relaxation or None
+        None where the objective has no relaxed form.
     """
 
     found: Found
-    wave_m_s: float
-    rounded: Found | None
+    waves: tuple[Repeated, ...]
+    free: Found | None
     rounded_intervals: tuple[int, ...]
-    relaxation: Relaxation
+    relaxation: Relaxation | None
 
     def record(self) -> dict[str, Any]:
         """Return what the command adds to its JSON."""
-        best = self.rounded
-        speed = None if best is None else best.certificate.speed_m_s
+        best, wave = self.found.certificate.speed_m_s, self.waves[0].speed_m_s
+        fastest = max(w.speed_m_s for w in self.waves)
+        relaxation = self.relaxation
         return {
-            "wave_speed_m_s": self.wave_m_s,
-            "speed_m_s": speed,
-            "gain": None if speed is None else speed / self.wave_m_s - 1,
-            "relaxed_speed_m_s": self.relaxation.speed_m_s,
+            "wave_speed_m_s": wave,
+            "speed_m_s": best,
+            "gain": best / wave - 1,
+            "repeated_waves": [asdict(w) for w in self.waves],
+            "gain_beyond_frequency": best / fastest - 1,
+            "rounded_speed_m_s": None if self.free is None else self.free.certificate.speed_m_s,
+            "relaxed_speed_m_s": None if relaxation is None else relaxation.speed_m_s,
             "relaxed_friction_speed_m_s": SMOOTHED_M_S,
             "intervals_after_rounding": list(self.rounded_intervals),
-            "switches_per_s": None if best is None else best.gait.switches_per_s,
-            "shortest_dwell_s": None if best is None else best.gait.shortest_dwell_s(),
+            "switches_per_s": self.found.gait.switches_per_s,
+            "shortest_dwell_s": self.found.gait.shortest_dwell_s(),
         }
 
 
@@ -83,28 +97,77 @@ def search_free(
     *,
     where: Where = HERE,
 ) -> FreeResult:
-    """Return the best gait with at most ``problem.intervals`` on-intervals per segment and cycle."""
+    """Return the best gait with at most ``problem.intervals`` on-intervals per segment and cycle.
+
+    The candidates: waves repeated k times per cycle for every k up to K, the relaxed optimum rounded, and a
+    wave with notches; each then gets its switch times optimized with as many intervals as it has.
+    """
     wave = search(replace(problem, intervals=1), starts, seed, say, where=where)
-    relaxation = relax(problem, wave.gait)
-    at_limits = 100 * np.mean(np.abs(relaxation.levels) > 0.95)
-    say(
-        f"valves relaxed to [-1, 1]: {relaxation.speed_m_s:.4f} m/s with friction smoothed at "
-        f"{SMOOTHED_M_S:g} m/s, {at_limits:.0f} % of the levels at their limits"
-    )
-    gait, counts = rounded(relaxation, problem)
-    candidates = [gait]
+    waves = [Repeated(1, wave.gait.frequency_hz, wave.certificate.speed_m_s)]
+    candidates: list[tuple[int, Gait]] = []
+    for repeats in range(2, problem.intervals + 1):
+        quicker = _quicker(problem, repeats)
+        if quicker is None:
+            say(f"no {repeats} pulses per cycle: dwell times leave no room")
+            break
+        say(f"waves {repeats} times per cycle: up to {quicker.limits.frequency_hz[1]:g} Hz")
+        found = search(quicker, starts, seed, say, where=where)
+        waves.append(Repeated(repeats, found.gait.frequency_hz, found.certificate.speed_m_s))
+        candidates.append((repeats, repeated(found.gait, repeats)))
+    best = wave
+    for repeats, gait in candidates:
+        best = _better(problem, best, _refined(replace(problem, intervals=repeats), gait, wave, say))
+    relaxation: Relaxation | None = None
+    counts: tuple[int, ...] = ()
+    own: list[Gait] = []
+    if not (problem.formulas.uses_switches or problem.formulas.uses_curvature):
+        relaxation = relax(problem, wave.gait)
+        at_limits = 100 * np.mean(np.abs(relaxation.levels) > 0.95)
+        say(
+            f"valves relaxed to [-1, 1]: {relaxation.speed_m_s:.4f} m/s with friction smoothed at "
+            f"{SMOOTHED_M_S:g} m/s, {at_limits:.0f} % of the levels at their limits"
+        )
+        gait, counts = rounded(relaxation, problem)
+        own.append(gait)
     if problem.intervals > 1:
-        candidates.append(_wave_with_notches(problem, wave.gait))
-    best, free = wave, None
-    for candidate in candidates:
-        found = _refined(problem, candidate, wave, say)
-        if found is None:
-            continue
-        if free is None or _total(problem, found) > _total(problem, free):
-            free = found
-        if found.certificate.passed and _total(problem, found) > _total(problem, best):
-            best = found
-    return FreeResult(best, wave.certificate.speed_m_s, free, counts, relaxation)
+        own.append(_wave_with_notches(problem, wave.gait))
+    free = None
+    for gait in own:
+        refined = _refined(problem, gait, wave, say)
+        best = _better(problem, best, refined)
+        if refined is not None and (free is None or _total(problem, refined) > _total(problem, free)):
+            free = refined
+    return FreeResult(best, tuple(waves), free, counts, relaxation)
+
+
+def _quicker(problem: CycleProblem, repeats: int) -> CycleProblem | None:
+    """Return the problem of a wave that is played `repeats` times per cycle; None where no dwell fits."""
+    low, high = problem.limits.frequency_hz
+    try:
+        limits = replace(problem.limits, frequency_hz=(repeats * low, repeats * high))
+    except InputError:
+        return None
+    return replace(problem, intervals=1, limits=limits)
+
+
+def repeated(gait: Gait, repeats: int) -> Gait:
+    """Return one cycle of the same motion that holds the gait's cycle `repeats` times."""
+    period = gait.period_s
+    rows = tuple(
+        tuple(
+            ((on + k * period) % (repeats * period), (off + k * period) % (repeats * period))
+            for k in range(repeats)
+            for on, off in ((a, a + (b - a) % period) for a, b in pairs)
+        )
+        for pairs in gait.intervals
+    )
+    return Gait(repeats * period, gait.pressure_kpa, rows)
+
+
+def _better(problem: CycleProblem, best: Found, found: Found | None) -> Found:
+    if found is None or not found.certificate.passed:
+        return best
+    return found if _total(problem, found) > _total(problem, best) else best
 
 
 def _total(problem: CycleProblem, found: Found) -> float:

@@ -16,6 +16,7 @@ LEAST_TURN_RAD_S = 0.05  # of a turn whose side is wanted and nothing else
 TURN_ERROR = 0.02  # share by which a wanted radius or turn rate may be missed
 STRAIGHT_RAD_S = 0.02  # turn rate below which a gait counts as straight
 SIDES = {"left": 1.0, "right": -1.0}
+LEAST_TICKS = 4  # in a period: fewer hold no wave
 CHAMBER_OVER_WIDTH = 1 / 6  # assumed diameter of an air chamber over the body's width
 
 
@@ -149,14 +150,25 @@ class Limits:
     chamber_volume_m3: float | None = None
 
     def __post_init__(self) -> None:
-        for name, (low, high), unit in (
-            ("frequency", self.frequency_hz, "Hz"),
-            ("pressure", self.pressure_kpa, "kPa"),
+        (slow, fast), (weak, strong) = self.frequency_hz, self.pressure_kpa
+        if not 0 < slow <= fast < math.inf:
+            raise InputError(f"frequency limits must be 0 < low <= high, found {slow:g} {fast:g} Hz")
+        if not (0 <= weak <= strong < math.inf and strong > 0):
+            raise InputError(f"pressure limits must be 0 <= low <= high, found {weak:g} {strong:g} kPa")
+        for name, value, unit in (
+            ("a tick", self.tick_s, "s"),
+            ("the largest curvature", self.max_curvature_1_m, "1/m"),
+            ("a chamber's volume", self.chamber_volume_m3, "m^3"),
         ):
-            if not (math.isfinite(low) and math.isfinite(high) and 0 < low <= high):
-                raise InputError(f"{name} limits must be 0 < low <= high, found {low:g} {high:g} {unit}")
-        if self.tick_s <= 0:
-            raise InputError(f"tick must be above 0 s, found {self.tick_s:g}")
+            if value is not None and not 0 < value < math.inf:
+                raise InputError(f"{name} must be above 0 {unit}, found {value:g}")
+        if not 0 <= self.min_dwell_s < math.inf:
+            raise InputError(f"a dwell must be at least 0 s, found {self.min_dwell_s:g}")
+        if LEAST_TICKS * self.tick_s * slow > 1:
+            raise InputError(
+                f"a tick of {self.tick_s:g} s is too long: the longest period, {1 / slow:g} s, must hold "
+                f"{LEAST_TICKS} of them at least"
+            )
         if self.min_dwell_s * 2 * self.frequency_hz[0] > 1:
             raise InputError(
                 f"a dwell of {self.min_dwell_s:g} s leaves no room for two switches in the longest period, "

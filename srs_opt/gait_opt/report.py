@@ -11,6 +11,8 @@ from srs_opt.gait_opt.score import transport_cost
 from srs_opt.gait_opt.search import Found
 from srs_opt.orbit.steady import steady_gait
 
+_NOTHING_BEYOND = 0.5  # % of speed that rounding and the search's tolerance explain
+
 
 def wave_parameters(gait: Gait) -> tuple[list[float], list[float]] | None:
     """Return phase (rad, in [0, 2 pi)) and offset per segment; None unless one interval per segment."""
@@ -72,6 +74,7 @@ def record(problem: CycleProblem, found: Found, solve_s: float, compile_s: float
         "certificate": found.certificate.record(),
         "starts": len(found.merits),
         "merits": list(found.merits),
+        "populations": found.populations,
         "iterations": found.iterations,
         "interrupted": found.interrupted,
         "solve_s": solve_s,
@@ -98,6 +101,8 @@ def summary(answer: dict[str, Any]) -> str:
         f"gap after 50 cycles {certificate['periodicity_gap']:.1e}, "
         f"largest Floquet multiplier {certificate['largest_floquet_multiplier']:.2f}",
         *_others(certificate),
+        *_freed(answer.get("free")),
+        *_scattered(answer),
         *_worst(answer),
     ]
     lines += [f"  {failure}" for failure in certificate["failures"]]
@@ -123,3 +128,33 @@ def _worst(answer: dict[str, Any]) -> list[str]:
         f"  worst of {len(robots)} robots: '{worst['name']}', {worst['speed_m_s']:.4f} m/s, {radius}, "
         f"band {worst['band_m']:.4f} m"
     ]
+
+
+def _scattered(answer: dict[str, Any]) -> list[str]:
+    """Say that the landscape is rugged, where populations had to go on from the starts."""
+    count, merits = answer["populations"], answer["merits"]
+    if not count:
+        return []
+    begun, gained = merits[:-count], merits[-count:]
+    words = (
+        f"{count} populations of simulated gaits come to merits from {min(gained):.4f} to {max(gained):.4f}"
+    )
+    if begun:
+        words += f", {len(begun)} starts from {min(begun):.4f} to {max(begun):.4f}"
+    return [f"  many optima: {words}"]
+
+
+def _freed(free: dict[str, Any] | None) -> list[str]:
+    """Say what more than one on-interval per cycle buys, and what of it a higher frequency buys too."""
+    if free is None or len(free["repeated_waves"]) < 2:
+        return []
+    fastest = max(free["repeated_waves"], key=lambda wave: wave["speed_m_s"])
+    beyond = 100 * free["gain_beyond_frequency"]
+    line = (
+        f"  {100 * free['gain']:+.1f} % against one on-interval per cycle; the wave at "
+        f"{fastest['frequency_hz']:.2f} Hz, {fastest['repeats']} times per cycle, makes "
+        f"{fastest['speed_m_s']:.4f} m/s: "
+    )
+    if beyond < _NOTHING_BEYOND:
+        return [line + "more intervals buy nothing beyond a higher limit on the frequency"]
+    return [line + f"beyond a higher limit on the frequency, more intervals buy {beyond:.1f} %"]

@@ -17,6 +17,8 @@ from srs_opt.gait_opt.collocation.problem import CycleProblem
 from srs_opt.gait_opt.finish import topped
 from srs_opt.gait_opt.goal import Goal
 from srs_opt.gait_opt.ladder import Climb, Rung, Step, climb, ladder, orbits_of
+from srs_opt.gait_opt.population import populations
+from srs_opt.gait_opt.reach import refuse_contradictions
 from srs_opt.gait_opt.score import Score, score
 from srs_opt.gait_opt.starts import starting_gaits, steered
 from srs_opt.orbit.steady import Orbit
@@ -28,6 +30,7 @@ _ALIKE = 1e-3  # merits closer than this are one optimum
 _EXACT_REACH = 0.01  # cycles that the switches may move in the last stage
 _NEAR_REACH, _MOVED_REACH = 0.05, 0.02  # the same for earlier results that keep the new limits, or do not
 _BEYOND = 0.03  # share by which a wanted speed may exceed the fastest gait's before it is refused at once
+_SCATTER = 0.03  # share by which the best start may exceed the second: more, and the search goes on
 _KEPT = 5e-3  # miss below which a gait keeps the limits
 _MOVED = Rung(0.01, 36, 0.1, 2, quick=True)  # friction that forgives, for results that had to move
 
@@ -56,6 +59,8 @@ class Found:
     certificate : Certificate
     merits : tuple of float
         Best merit of every start that led somewhere, in their order (at the rung to which it was carried).
+    populations : int
+        How many of these, the last ones, are of populations of simulated gaits.
     steps : tuple of Step
         Of the winning start.
     iterations, seconds
@@ -68,6 +73,7 @@ class Found:
     orbits: tuple[Orbit, ...]
     certificate: Certificate
     merits: tuple[float, ...]
+    populations: int
     steps: tuple[Step, ...]
     iterations: int
     seconds: float
@@ -98,16 +104,19 @@ def search(
     Raises
     ------
     NoAnswerError
-        If no start leads anywhere, or the wanted speed lies beyond that of the fastest gait.
+        If limits contradict each other, no start leads anywhere, or the wanted speed lies beyond that of the
+        fastest gait.
     """
     begun = time.perf_counter()
+    refuse_contradictions(problem)
     if warm is None and problem.goal.speed_m_s:
         say("the fastest straight gait first: is the wanted speed within reach?")
         _refuse_out_of_reach(problem, problem.goal.speed_m_s, starts, seed, say, where)
     own = max(r.friction_speed_m_s for r in problem.robots)
     if warm is None:
         candidates = starting_gaits(problem, starts, seed)
-        rungs = ladder(own, quick=problem.goal.only_fast)
+        # tight turns and pivots have more optima than starts: a population alone does better, and sooner
+        rungs = () if _rugged(problem) else ladder(own, quick=problem.goal.only_fast)
         cut = max(len([r for r in rungs if r.friction_speed_m_s >= 0.01]), len(rungs) - 2)
         lower, upper = rungs[:cut], rungs[cut:]
         reach = _EXACT_REACH
@@ -127,9 +136,13 @@ def search(
         carried, interrupted = _all(climbing, [(k, climbs[k].gait) for k in chosen], upper, where)
         for k, top in carried.items():
             climbs[k] = replace(top, steps=(*climbs[k].steps, *top.steps))
-        best = max(carried or climbs, key=lambda k: climbs[k].score.total)
-    else:
-        best = max(climbs, key=lambda k: climbs[k].score.total)
+    evolved: list[Climb] = []
+    if not interrupted and warm is None and problem.intervals == 1 and (_rugged(problem) or _scatter(climbs)):
+        evolved, interrupted = _evolved(problem, climbs, starts, seed, say, where)
+    if evolved and _rugged(problem):  # the starts were not searched
+        climbs = {}
+    climbs |= {len(candidates) + k: found for k, found in enumerate(evolved)}
+    best = max(climbs, key=lambda k: climbs[k].score.total)
     reached = climbs[best].gait
     exact, certificate, orbits = topped(problem, reached, reach, _reporter(say, best, len(candidates)))
     if warm is not None and not certificate.passed and not interrupted:
@@ -140,11 +153,46 @@ def search(
         orbits,
         certificate,
         tuple(c.score.merit for c in climbs.values()),
+        len(evolved),
         (*climbs[best].steps, *exact.steps),
         sum(c.iterations for c in climbs.values()) + sum(s.iterations for s in exact.steps),
         time.perf_counter() - begun,
         interrupted,
     )
+
+
+def _rugged(problem: CycleProblem) -> bool:
+    """Whether the goal is known to have more optima than starts would find."""
+    return problem.goal.turn == "side" and problem.intervals == 1
+
+
+def _scatter(climbs: dict[int, Climb]) -> bool:
+    """Whether several starts led somewhere and no second one confirms the best."""
+    totals = sorted((c.score.total for c in climbs.values()), reverse=True)
+    return len(totals) > 1 and totals[0] - totals[1] > _SCATTER * abs(totals[0])
+
+
+def _evolved(
+    problem: CycleProblem, climbs: dict[int, Climb], starts: int, seed: int, say: Say, where: Where
+) -> tuple[list[Climb], bool]:
+    """Return what populations of simulated gaits come to, and whether Ctrl-C ended them early."""
+    totals = [c.score.total for c in climbs.values()]
+    if _rugged(problem):
+        say("this objective has many optima: populations of simulated gaits")
+    else:
+        scatter = f"the starts scatter from {min(totals):.4f} to {max(totals):.4f}"
+        say(f"{scatter}: populations of simulated gaits go on")
+    found: list[Climb] = []
+    many = populations(
+        problem, 2 * starts, seed, say, jobs=where.jobs, cluster=where.cluster, resume=where.resume
+    )
+    try:
+        for gait in many:
+            orbits = orbits_of(problem, gait)
+            found.append(Climb(gait, orbits, score(problem, gait, orbits)))
+    except KeyboardInterrupt:
+        return found, True
+    return found, False
 
 
 def _warmed(problem: CycleProblem, warm: Gait, say: Say) -> tuple[Gait, bool]:
@@ -229,10 +277,12 @@ def _distinct(climbs: dict[int, Climb]) -> list[int]:
 
 
 def _reporter(say: Say, start: int, starts: int) -> Callable[[Step, Score], None]:
+    who = f"start {start + 1} of {starts}" if start < starts else f"population {start - starts + 1}"
+
     def report(step: Step, best: Score) -> None:
         rung = step.rung
         say(
-            f"start {start + 1} of {starts}: friction smoothed at {rung.friction_speed_m_s:g} m/s, "
+            f"{who}: friction smoothed at {rung.friction_speed_m_s:g} m/s, "
             f"{step.elements} elements, {step.iterations} iterations: "
             f"{step.speed_m_s:.4f} m/s by collocation, "
             f"{step.simulated_m_s:.4f} simulated; best {best.total:.4f}{step.trouble}"

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from srs_opt.gait import Wave
 from srs_opt.gait_opt.collocation.problem import CycleProblem
-from srs_opt.gait_opt.free import intervals_of, merged, notched, search_free, sum_up
+from srs_opt.gait_opt.free import intervals_of, merged, notched, repeated, search_free, sum_up
 from srs_opt.gait_opt.goal import Goal, Limits
 from srs_opt.robot import wpi_srs
 
@@ -29,14 +30,30 @@ def test_short_pulses_go_and_long_ones_are_cut():
     assert cut == pytest.approx(np.array([(0.3, 0.53), (0.57, 0.8)]))
 
 
+def test_a_repeated_wave_is_the_same_motion():
+    wave = Wave(3.0, 45.0, (0.2, 1.0, 1.9, 2.6), (0.1, 0.2, 0.15, 0.3)).gait()
+    twice = repeated(wave, 2)
+    assert twice.frequency_hz == pytest.approx(1.5)
+    for t in np.linspace(0.0, twice.period_s, 50, endpoint=False):
+        assert twice.valve(t + 1e-4) == pytest.approx(wave.valve(t + 1e-4))
+
+
+@pytest.mark.slow
+def test_two_intervals_find_the_wave_at_twice_the_frequency():
+    freed = search_free(CycleProblem((wpi_srs(),), "complex", Goal(), Limits(), intervals=2), starts=2)
+    assert freed.found.certificate.passed
+    assert freed.found.certificate.speed_m_s >= 0.62
+    assert freed.waves[1].frequency_hz > 2.0
+
+
 @pytest.mark.slow
 def test_one_interval_is_the_wave():
     freed = search_free(CycleProblem((wpi_srs(),), "complex", Goal(), Limits()), starts=1)
     told = freed.record()
     assert freed.found.certificate.passed
-    assert freed.rounded is not None
-    assert freed.rounded.certificate.passed
-    assert told["speed_m_s"] == pytest.approx(told["wave_speed_m_s"], rel=0.005)
+    assert freed.free is not None
+    assert freed.free.certificate.passed
+    assert told["rounded_speed_m_s"] == pytest.approx(told["wave_speed_m_s"], rel=0.005)
     assert told["wave_speed_m_s"] > 0.545
     assert told["relaxed_speed_m_s"] > told["wave_speed_m_s"]
     assert told["switches_per_s"] == pytest.approx(16.0, rel=0.1)

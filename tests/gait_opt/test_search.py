@@ -5,6 +5,7 @@ import math
 import os
 import signal
 import threading
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,6 +19,8 @@ from srs_opt.gait_opt.certificate import certify, periodicity_gap, self_clearanc
 from srs_opt.gait_opt.collocation.problem import CycleProblem
 from srs_opt.gait_opt.goal import Goal, Limits, air_work_j, chamber_volume_m3
 from srs_opt.gait_opt.ladder import Rung, climb
+from srs_opt.gait_opt.population import evolved
+from srs_opt.gait_opt.reach import refuse_contradictions
 from srs_opt.gait_opt.report import wave_parameters
 from srs_opt.gait_opt.search import Where, search
 from srs_opt.orbit.steady import integrator, steady_gait
@@ -265,6 +268,10 @@ def test_air_is_counted_by_fills():
         (["--min-dwell", "0.6"], "dwell"),
         (["--pressure", "50", "40"], "pressure"),
         (["--radius", "0"], "radius"),
+        (["--tick", "1"], "tick of 1 s is too long"),
+        (["--pressure", "-1", "40"], "pressure"),
+        (["--objective", "pivot", "--radius", "0.2"], "chooses its turn itself"),
+        (["--objective", "fly"], "--plugin"),
     ],
 )
 def test_bad_wishes_are_refused_in_one_line(options, word, capsys, tmp_path):
@@ -272,6 +279,37 @@ def test_bad_wishes_are_refused_in_one_line(options, word, capsys, tmp_path):
     error = capsys.readouterr().err
     assert word in error
     assert error.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    "limits",
+    [{"max_curvature_1_m": -3}, {"tick_s": 1.0}, {"tick_s": math.nan}, {"min_dwell_s": -1},
+     {"pressure_kpa": (0.0, 0.0)}, {"chamber_volume_m3": 0.0}],
+)  # fmt: skip
+def test_limits_that_are_none_are_refused(limits):
+    with pytest.raises(InputError):
+        Limits(**limits)
+
+
+def test_a_curvature_below_reach_is_refused_with_the_least_in_reach(capsys, tmp_path):
+    """Oracle: no segment bends less than in the half-cycle wave at the least pressure, simulated."""
+    wave = Wave.uniform(4, 2.0, 41.0, 1.0).gait()
+    peak = np.abs(steady_gait(ROBOT, wave).kappa).max()
+    assert main(["--max-curvature", f"{0.97 * peak:.3f}", "--out", str(tmp_path)]) == 1
+    said = capsys.readouterr().err
+    assert f"the least that can be reached is {peak:.1f}" in said
+    case = CycleProblem((ROBOT,), "complex", Goal(), Limits(max_curvature_1_m=0.999 * peak))
+    refuse_contradictions(case)  # within the certificate's tolerance
+    refuse_contradictions(replace(case, limits=Limits(pressure_kpa=(0.0, 80.0), max_curvature_1_m=1.0)))
+
+
+def test_a_population_finds_what_a_start_does_not():
+    """Quick time constants make the landscape rugged; 0.322 m/s is the best known there."""
+    quick = ROBOT.with_values(tau1_s=0.3 * ROBOT.tau1_s, tau2_s=0.3 * ROBOT.tau2_s)
+    case = CycleProblem((quick,), "complex", Goal(), Limits())
+    gait, total = evolved(case, published_wave(quick, 1.5, 48.0).gait(), 3, 300)
+    assert steady_gait(quick, gait).speed_m_s == pytest.approx(total, abs=1e-3)
+    assert total > 0.25  # in 300 gaits; the ladder comes from there to 0.21 m/s
 
 
 def test_unknown_objective():
