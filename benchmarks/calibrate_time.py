@@ -11,6 +11,7 @@ import numpy as np
 from benchmarks.section import Section
 from srs_opt.calibrate.run import calibrate
 from srs_opt.measurement.dataset import load_dataset
+from srs_opt.parallel import executor
 from virtual_lab.dataset import write_dataset
 from virtual_lab.draw import draw_truth
 from virtual_lab.trials import large_design
@@ -29,7 +30,8 @@ def run(quick: bool) -> Section:
     for jobs in (1,) if quick else (1, 2):
         lines: list[str] = []
         wall, cpu = time.perf_counter(), time.process_time()
-        found = calibrate(dataset, report=lines.append, jobs=jobs)
+        with executor(jobs) as where:
+            found = calibrate(dataset, report=lines.append, where=where)
         own = time.process_time() - cpu
         took = f"{time.perf_counter() - wall:.1f}"
         rows.append(

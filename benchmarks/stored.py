@@ -16,7 +16,8 @@ from typing import Any, cast
 from benchmarks.section import machine
 from srs_opt.command import positive_int
 from srs_opt.files import write_text
-from srs_opt.sweep import Resume, source_digest, sweep
+from srs_opt.parallel import executor
+from srs_opt.parallel.sweep import Resume, source_digest, sweep
 
 HERE = Path(__file__).resolve().parent
 STORED = HERE / "stored"
@@ -55,10 +56,9 @@ def gather(
     """
     key = " ".join([name, depends, *(source_digest(HERE.parent / package) for package in PACKAGES)])
     unfinished = options.rows.with_suffix(".unfinished")
-    rows = list(
-        sweep(partial(_each, _importable(work)), items, chunk=1, jobs=options.jobs, cluster=options.cluster,
-              what=name, quiet=False, resume=Resume(unfinished, key))
-    )  # fmt: skip
+    each, kept = partial(_each, _importable(work)), Resume(unfinished, key)
+    with executor(options.jobs, options.cluster) as where:
+        rows = list(sweep(each, items, chunk=1, where=where, what=name, quiet=False, resume=kept))
     lines = [{"measured": machine(), "seed": options.seed}, *rows]
     write_text(options.rows, "".join(json.dumps(line) + "\n" for line in lines))
     shutil.rmtree(unfinished, ignore_errors=True)

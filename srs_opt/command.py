@@ -226,6 +226,14 @@ def progress(
     )
 
 
+def one_thread_of_linear_algebra() -> None:
+    """Keep NumPy to one thread, unless the user has said otherwise; call it before NumPy is imported.
+
+    Processes share the cores already; threads of the linear algebra would only get in their way.
+    """
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+
 def positive_int(text: str) -> int:
     """Parse a whole number above zero."""
     try:

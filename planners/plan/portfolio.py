@@ -22,7 +22,7 @@ from planners.plan.solve import BEAM, LEAST_SLACK_M, TOO_NARROW, LatticeSolver
 from planners.search.lattice import LatticeSettings
 from planners.search.problem import Problem
 from planners.search.tree import Step
-from srs_opt.processes import workers_deaf_to_interrupts
+from srs_opt.parallel.interrupts import workers_deaf_to_interrupts
 
 CONTROL = ("rrt", "est", "kpiece")
 PLANNERS = ("lattice", "dubins-rrtconnect", "rs-rrtconnect", "kpiece", "est", "rrt")

@@ -7,8 +7,14 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from srs_opt.command import Answer, Parser, make_parser, run_command, say
-from srs_opt.processes import one_thread_of_linear_algebra
+from srs_opt.command import (
+    Answer,
+    Parser,
+    make_parser,
+    one_thread_of_linear_algebra,
+    run_command,
+    say,
+)
 
 if TYPE_CHECKING:
     from srs_opt.calibrate.result import Calibration
@@ -39,14 +45,14 @@ def run(options: argparse.Namespace) -> Answer:
     """Calibrate and write robot.yaml."""
     from srs_opt.calibrate.run import calibrate, going_on_from
     from srs_opt.measurement.dataset import load_dataset
+    from srs_opt.parallel import executor
     from srs_opt.robot import load_robot, save_robot
 
     dataset = load_dataset(options.dataset)
     if options.robot is not None:
         dataset = going_on_from(dataset, load_robot(options.robot))
-    found = calibrate(
-        dataset, options.model, lambda message: say(options, message), options.jobs, options.cluster
-    )
+    with executor(options.jobs, options.cluster) as where:
+        found = calibrate(dataset, options.model, lambda message: say(options, message), where)
     path = save_robot(found.robot, options.out / "robot.yaml")
     return Answer(_record(found), _summary(found), files=(path,))
 

@@ -140,8 +140,13 @@ class TrialRun:
         """
         return alone(self.search(values, tolerance_m_s))
 
-    def search(self, values: Values, tolerance_m_s: float = TOLERANCE_M_S) -> Search[Nodes]:
-        """Do what a call does, as a search: see `simulate.together` for many trials at once."""
+    def search(
+        self, values: Values, tolerance_m_s: float = TOLERANCE_M_S, attempts: int = ATTEMPTS
+    ) -> Search[Nodes]:
+        """Do what a call does, as a search: see `simulate.together` for many trials at once.
+
+        With a single one of `attempts` the last meshes serve as they are.
+        """
         structure, kept = self.model.structure(values)
         packed = self.model.pack(values, self.conditions)
         p = packed.p
@@ -150,7 +155,7 @@ class TrialRun:
         states, valves, steps = [x[:, None]], [], []
         kernel = step_kernel(structure)
         for number, piece in enumerate(_cycles(timeline, self.trial.period_s)):
-            new, mesh = yield from self._piece((tolerance_m_s, number), kernel, x, piece, p[kept])
+            new, mesh = yield from self._piece((tolerance_m_s, number), kernel, x, piece, p[kept], attempts)
             x = new[:, -1]
             states.append(new)
             valves.append(piece.valve[:, mesh.phase])
@@ -165,17 +170,23 @@ class TrialRun:
         return x
 
     def _piece(
-        self, key: tuple[float, int], kernel: Kernel, x: np.ndarray, piece: Timeline, p: np.ndarray
+        self,
+        key: tuple[float, int],
+        kernel: Kernel,
+        x: np.ndarray,
+        piece: Timeline,
+        p: np.ndarray,
+        attempts: int,
     ) -> Search[tuple[np.ndarray, Mesh]]:
         """Integrate one cycle on the mesh that served it last time, refined where that is too coarse."""
         phases = (*np.round(piece.duration_s, 7), *piece.valve.ravel())
         tolerance, number = key
         kept = self.meshes.get(key) or self.meshes.get((tolerance, number - 1))
         mesh = _fitted(kept, piece.duration_s, phases) or Mesh.uniform(piece.duration_s, STEP_S)
-        for attempt in range(ATTEMPTS):
+        for attempt in range(attempts):
             got = yield Stretch(kernel, x, mesh, piece.valve, p)
             _check(got)
-            if got.error_m_s.max() <= ACCEPTED * tolerance or attempt == ATTEMPTS - 1:
+            if got.error_m_s.max() <= ACCEPTED * tolerance or attempt == attempts - 1:
                 break
             mesh = mesh.refined(got.error_m_s, tolerance)
         self.meshes[key] = (phases, mesh)

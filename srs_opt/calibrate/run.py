@@ -7,7 +7,6 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from srs_opt.calibrate.candidates import fitted_coordinates
-from srs_opt.calibrate.crew import helped
 from srs_opt.calibrate.experiment import Experiment
 from srs_opt.calibrate.fit import fit, start_point
 from srs_opt.calibrate.maps import fit_maps
@@ -16,6 +15,7 @@ from srs_opt.calibrate.noise import noise_sd_m
 from srs_opt.calibrate.result import Calibration, calibration
 from srs_opt.errors import InputError
 from srs_opt.measurement.records import DataSet
+from srs_opt.parallel import HERE, Executor
 from srs_opt.robot import Robot
 
 
@@ -23,12 +23,11 @@ def calibrate(
     dataset: DataSet,
     model: str = "complex",
     report: Callable[[str], None] | None = None,
-    jobs: int = 1,
-    cluster: str | None = None,
+    where: Executor = HERE,
 ) -> Calibration:
     """Fit the robot's parameters to all usable trials, or to the maps where there are no tracks.
 
-    `jobs` processes, or a Dask cluster (address of its scheduler), share the trials; same answer.
+    `where` says who simulates the trials (`srs_opt.parallel.executor`); the answer is the same.
 
     Raises
     ------
@@ -56,9 +55,8 @@ def calibrate(
                 f"robot '{dataset.robot.name}' and the set's markers make {expected}"
             )
     base = fitted_coordinates(dataset.robot)
-    experiment = Experiment(Model(dataset.robot, model), trials, noise_sd_m(dataset), dataset.bench)
-    with helped(experiment, jobs, cluster):
-        found = fit(experiment, base, start_point(base), report=tell)
+    experiment = Experiment(Model(dataset.robot, model), trials, noise_sd_m(dataset), dataset.bench, where)
+    found = fit(experiment, base, start_point(base), report=tell)
     before, after = math.sqrt(found.start_misfit_ratio), math.sqrt(found.misfit_ratio)
     return calibration(dataset.robot, found, before, after)
 

@@ -7,8 +7,14 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from srs_opt.command import Answer, Parser, make_parser, run_command, say
-from srs_opt.processes import one_thread_of_linear_algebra
+from srs_opt.command import (
+    Answer,
+    Parser,
+    make_parser,
+    one_thread_of_linear_algebra,
+    run_command,
+    say,
+)
 
 if TYPE_CHECKING:
     from planners.maze.maze import Maze
@@ -65,26 +71,34 @@ def build_parser() -> Parser:
 def run(options: argparse.Namespace) -> Answer:
     """Find the discrepancy; write the report and the corrected robot."""
     from srs_opt.calibrate.run import going_on_from
-    from srs_opt.discrepancy.answer import answer, corrected_robot
     from srs_opt.discrepancy.pipeline import find_discrepancy
-    from srs_opt.discrepancy.report import write_report
     from srs_opt.measurement.dataset import load_dataset
-    from srs_opt.robot import load_robot, save_robot
+    from srs_opt.parallel import executor
+    from srs_opt.robot import load_robot
 
     dataset = load_dataset(options.dataset)
     if options.robot is not None:
         dataset = going_on_from(dataset, load_robot(options.robot))
     effects = _effect_names(options.effects) if options.effects else None
     maze = _maze(options, dataset.robot)
-    found = find_discrepancy(
-        dataset,
-        effects,
-        model=options.model,
-        seed=options.seed,
-        jobs=options.jobs,
-        cluster=options.cluster,
-        report=lambda message: say(options, message),
-    )
+    with executor(options.jobs, options.cluster) as where:
+        found = find_discrepancy(
+            dataset,
+            effects,
+            model=options.model,
+            seed=options.seed,
+            where=where,
+            report=lambda message: say(options, message),
+        )
+        return _written(options, found, maze)
+
+
+def _written(options: argparse.Namespace, found: Discrepancy, maze: Maze | None) -> Answer:
+    """Write the corrected robot and the report, whose pictures simulate once more."""
+    from srs_opt.discrepancy.answer import answer, corrected_robot
+    from srs_opt.discrepancy.report import write_report
+    from srs_opt.robot import save_robot
+
     robot = corrected_robot(found)
     files = []
     if robot is not None:

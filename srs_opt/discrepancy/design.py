@@ -149,14 +149,17 @@ def _trial_gains(
     experiment: Experiment, truth: Hypothesis, other: Hypothesis, new: Mapping[str, Trial]
 ) -> dict[str, float]:
     """Return the deviance by which `other`, refitted to all data, would miss what `truth` predicts."""
-    probe = Experiment(experiment.model, tuple(new.values()), experiment.sd_m)
+    trials = tuple(new.values())
     known = np.linalg.pinv(other.fit.covariance, hermitian=True)
     free = [k for k in range(len(other.fit.coordinates)) if other.fit.covariance[k, k] > 0]
     none = np.zeros(len(other.fit.coordinates))
     try:
-        expected = probe.predictions(probe.trials, Point(truth.fit.point.values))
-        probe.tracks = {t.name: e.points for t, e in zip(probe.trials, expected)}
-        grams = probe.grams(Point(other.fit.point.values), other.fit.coordinates)
+        blank = Experiment(experiment.model, trials, experiment.sd_m)  # its markers stand at zero
+        against = blank.residuals(trials, Point(truth.fit.point.values))
+        seen = [replace(t, markers_m=-r.reshape(r.shape[0], -1, 2)) for t, r in zip(trials, against)]
+        grams = Experiment(experiment.model, seen, experiment.sd_m).grams(
+            Point(other.fit.point.values), other.fit.coordinates
+        )
     except NoAnswerError:
         return dict.fromkeys(new, 0.0)
     found = {}

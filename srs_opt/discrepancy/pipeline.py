@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from srs_opt.calibrate.candidates import Candidate, all_candidates, fitted_coordinates
-from srs_opt.calibrate.crew import helped
 from srs_opt.calibrate.experiment import Experiment
 from srs_opt.calibrate.fit import FAR_OFF
 from srs_opt.calibrate.forms import form_of_entry
@@ -35,6 +34,7 @@ from srs_opt.discrepancy.verdict import (
     judge,
 )
 from srs_opt.measurement.records import DataSet
+from srs_opt.parallel import HERE, Executor
 
 
 @dataclass(frozen=True)
@@ -88,8 +88,7 @@ def find_discrepancy(
     *,
     model: str = "complex",
     seed: int = 0,
-    jobs: int = 1,
-    cluster: str | None = None,
+    where: Executor = HERE,
     report: Callable[[str], None] | None = None,
 ) -> Discrepancy:
     """Find what the model lacks.
@@ -101,10 +100,8 @@ def find_discrepancy(
         Names to consider; default all that are known.
     model : {"complex", "simplified"}
     seed : int
-    jobs : int
-        Processes; the answer does not depend on it.
-    cluster : str, optional
-        Address of a Dask scheduler that gets the work instead, ``host:port``.
+    where : Executor
+        Who simulates the trials (`srs_opt.parallel.executor`); the answer does not depend on it.
     report : callable, optional
         Told what is being done.
     """
@@ -116,11 +113,11 @@ def find_discrepancy(
         return _not_testable(dataset, split, sd, started)
     quick = few_and_brief(split.open, seed)
     trials = (*split.open, *split.sealed, *quick)
-    experiment = Experiment(Model(dataset.robot, model), trials, sd, dataset.bench)
+    groups = split.open, quick, split.sealed
+    experiment = Experiment(Model(dataset.robot, model), trials, sd, dataset.bench, where, groups)
     candidates = _candidates(dataset, effects)
     search = Search(experiment, fitted_coordinates(dataset.robot), candidates, split.open, seed, tell, quick)
-    with helped(experiment, jobs, cluster, (split.open, quick, split.sealed)):
-        return _examine(dataset, search, split, tell, started, restricted=effects is not None)
+    return _examine(dataset, search, split, tell, started, restricted=effects is not None)
 
 
 def _examine(

@@ -75,7 +75,7 @@ def sealed_residuals(experiment: Experiment, fit: Fit, trials: Sequence[Trial]) 
         if settled:
             break
         point = Point(fit.point.values, moved)
-    return [experiment.residual(t, p) for t, p in zip(trials, experiment.predictions(trials, point))]
+    return experiment.residuals(trials, point)
 
 
 def open_seal(

@@ -15,8 +15,9 @@ import numpy as np
 from srs_opt.errors import InputError
 from srs_opt.files import write_with
 from srs_opt.gait import Wave
+from srs_opt.parallel import executor
+from srs_opt.parallel.sweep import Resume, sweep
 from srs_opt.robot import Robot
-from srs_opt.sweep import Resume, sweep
 from srs_opt.table import first_error, read_table
 
 SETTINGS = ("frequency_hz", "pressure_kpa", "offset", "phase_lag_rad")
@@ -98,12 +99,11 @@ def gait_map(
         Wave.uniform(robot.segments, point[0], point[1], point[3], point[2])
     work = partial(map_points, robot, model)
     kept = None if resume is None else Resume(resume, f"gait map {robot} {model}")
-    rows = sweep(
-        work, points, chunk=_CHUNK, jobs=jobs, cluster=cluster, what="gaits", quiet=quiet, resume=kept
-    )
     table = np.empty((len(points), len(COLUMNS)))
-    for k, row in enumerate(rows):
-        table[k] = row
+    with executor(jobs, cluster) as where:
+        rows = sweep(work, points, chunk=_CHUNK, where=where, what="gaits", quiet=quiet, resume=kept)
+        for k, row in enumerate(rows):
+            table[k] = row
     return GaitMap(table)
 
 

@@ -20,8 +20,9 @@ from srs_opt.gait_opt.starts import best_start, plain_waves
 from srs_opt.gait_opt.table import GaitTable, TableGait
 from srs_opt.gait_opt.wishes import Wish, generations, wishes
 from srs_opt.orbit.steady import Orbit, steady_gait
+from srs_opt.parallel import executor
+from srs_opt.parallel.sweep import Resume, sweep
 from srs_opt.robot import Robot
-from srs_opt.sweep import Resume, sweep
 
 TABLE_PRESSURE_KPA = (20.0, 55.0)
 _BAND_EXCESS = 0.01
@@ -73,12 +74,13 @@ def build_table(
     asked = wishes(robot)
     for group in generations(asked):
         tasks = [Task(wish, starts[wish.after]) for wish in group]
-        results = sweep(partial(_fulfilled, work), tasks, chunk=1, jobs=jobs, cluster=cluster, resume=kept)
-        for task, result in zip(tasks, results):
-            say(result["line"])
-            entries[task.wish.name] = [TableGait.of_record(g) for g in result["gaits"]]
-            gait = result["next"]
-            starts[task.wish.name] = task.start if gait is None else Gait.of_record(gait)
+        with executor(jobs, cluster) as where:
+            results = sweep(partial(_fulfilled, work), tasks, chunk=1, where=where, resume=kept)
+            for task, result in zip(tasks, results):
+                say(result["line"])
+                entries[task.wish.name] = [TableGait.of_record(g) for g in result["gaits"]]
+                gait = result["next"]
+                starts[task.wish.name] = task.start if gait is None else Gait.of_record(gait)
     gaits = tuple(entry for wish in asked for entry in entries[wish.name])
     if not gaits:
         raise NoAnswerError(f"no gait of the table is within reach of robot '{robot.name}'")

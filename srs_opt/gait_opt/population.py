@@ -22,7 +22,8 @@ from srs_opt.gait_opt.collocation.problem import CycleProblem
 from srs_opt.gait_opt.score import score
 from srs_opt.gait_opt.starts import starting_gaits
 from srs_opt.orbit.steady import Orbit, steady_gaits
-from srs_opt.sweep import Resume, sweep
+from srs_opt.parallel import executor
+from srs_opt.parallel.sweep import Resume, sweep
 
 SIZE = 20  # gaits per generation: the half finds the nearest optimum, the double takes twice the time
 EVALUATIONS = 3000  # gaits per population: what nine unknowns take to come to rest
@@ -94,11 +95,12 @@ def populations(
     for k in range(0, len(pieces), _TOGETHER):
         work = partial(_evolved, problem)
         batch = pieces[k : k + _TOGETHER]
-        for record in sweep(work, batch, chunk=1, jobs=jobs, cluster=cluster, resume=kept):
-            gait = Gait.of_record(record["gait"])
-            totals.append(float(record["total"]))
-            say(f"population {len(totals)}: score {totals[-1]:.4f}")
-            yield gait
+        with executor(jobs, cluster) as where:
+            for record in sweep(work, batch, chunk=1, where=where, resume=kept):
+                gait = Gait.of_record(record["gait"])
+                totals.append(float(record["total"]))
+                say(f"population {len(totals)}: score {totals[-1]:.4f}")
+                yield gait
         first, second = sorted(totals, reverse=True)[:2]
         if first - second <= AGREED * abs(first):
             return

@@ -22,7 +22,8 @@ from srs_opt.gait_opt.reach import refuse_contradictions
 from srs_opt.gait_opt.score import Score, score
 from srs_opt.gait_opt.starts import starting_gaits, steered
 from srs_opt.orbit.steady import Orbit
-from srs_opt.sweep import Resume, sweep
+from srs_opt.parallel import executor
+from srs_opt.parallel.sweep import Resume, sweep
 
 Say = Callable[[str], None]
 _CARRIED = 2  # starts that are carried to the robot's own friction
@@ -252,15 +253,15 @@ def _all(
     problem = climbing.problem
     kept = None if where.resume is None else Resume(where.resume, f"gait_opt {problem} {rungs}")
     work = partial(climbing, rungs)
-    records = sweep(work, gaits, chunk=1, jobs=where.jobs, cluster=where.cluster, resume=kept)
     climbs: dict[int, Climb] = {}
     try:
-        for (k, _), record in zip(gaits, records):
-            if record["gait"] is not None:
-                gait = Gait.of_record(record["gait"])
-                orbits = orbits_of(problem, gait)
-                steps = tuple(Step.of_record(step) for step in record["steps"])
-                climbs[k] = Climb(gait, orbits, score(problem, gait, orbits), steps)
+        with executor(where.jobs, where.cluster) as several:
+            for (k, _), record in zip(gaits, sweep(work, gaits, chunk=1, where=several, resume=kept)):
+                if record["gait"] is not None:
+                    gait = Gait.of_record(record["gait"])
+                    orbits = orbits_of(problem, gait)
+                    steps = tuple(Step.of_record(step) for step in record["steps"])
+                    climbs[k] = Climb(gait, orbits, score(problem, gait, orbits), steps)
     except KeyboardInterrupt:
         return climbs, True
     return climbs, False

@@ -13,12 +13,13 @@ from srs_opt.gait import Gait
 from srs_opt.orbit.actuators import actuator_multiplier
 from srs_opt.orbit.motion import CycleMotion, cycle_motion, rotate
 from srs_opt.orbit.solve import PeriodicSolution, search_orbit
+from srs_opt.parallel import executor
+from srs_opt.parallel.sweep import sweep
 from srs_opt.robot import Robot
 from srs_opt.simulate.integrate import TOLERANCE_M_S, Integrator
 from srs_opt.simulate.rosenbrock import WORK
 from srs_opt.simulate.shapes import centre_lines
 from srs_opt.simulate.together import Search, alone, together
-from srs_opt.sweep import sweep
 
 CHAINS, CHAIN = 8, 12  # gaits searched side by side, and one after the other
 SAMPLES = 48  # body shapes per cycle for the envelope
@@ -149,7 +150,8 @@ def steady_gaits(
     for gait in gaits:
         _check_segments(robot, gait)
     work = partial(_side_by_side, robot, model, tolerance)
-    return list(sweep(work, gaits, chunk=CHAINS * CHAIN, jobs=jobs))
+    with executor(jobs) as where:
+        return list(sweep(work, gaits, chunk=CHAINS * CHAIN, where=where))
 
 
 def _side_by_side(

@@ -82,7 +82,7 @@ def test_any_number_of_processes_gives_the_same(tmp_path, capsys):
     folder = made(tmp_path / "set")
     one, _ = calibrated(folder, capsys)
     two, _ = calibrated(folder, capsys, "--jobs", "2")
-    assert two["parameters"] == pytest.approx(one["parameters"], rel=1e-9)
+    assert (two["parameters"], two["sd"]) == (one["parameters"], one["sd"])  # to the last bit
 
 
 def test_a_trial_of_nothing_is_left_out_and_said(tmp_path, capsys):

@@ -20,12 +20,12 @@ def setting():
     time_s = np.arange(120) / 100
     blank = np.zeros((time_s.size, robot.links, 2))
     trial = Trial("t", 1.5, 48.0, 0.4, np.pi / 2, 0.7, 1.2, time_s, markers_m=blank)
-    experiment = Experiment(Model(robot), [trial], 0.001)
+    experiment = Experiment(Model(robot), [trial], 0.001).work
     base = base_coordinates(robot)
     sizes = tuple(c for k in all_candidates(robot.links) for c in k.sizes)
     values = {**start_point(base).values, "curvature_bias.bias": 0.5, "camera_scale.scale": 0.02}
-    slopes = experiment.predict(trial, Point(values), (*base, *sizes), FINE_M_S).slopes
-    return experiment, trial, values, (*base, *sizes), slopes
+    slopes = experiment.predict("t", Point(values), (*base, *sizes), FINE_M_S).slopes
+    return experiment, values, (*base, *sizes), slopes
 
 
 # slopes are of order 2 in the step: a few per mille here, enough for Gauss-Newton to converge
@@ -54,11 +54,11 @@ def setting():
     ],
 )
 def test_slopes_are_those_of_the_prediction(setting, name):
-    experiment, trial, values, coordinates, slopes = setting
+    experiment, values, coordinates, slopes = setting
     k = [c.name for c in coordinates].index(name)
     h = 2e-3 * coordinates[k].typical
     ends = [
-        experiment.predict(trial, Point({**values, name: values.get(name, 0.0) + s * h}), (), FINE_M_S).points
+        experiment.predict("t", Point({**values, name: values.get(name, 0.0) + s * h}), (), FINE_M_S).points
         for s in (1, -1)
     ]
     difference = (ends[0] - ends[1]) / (2 * h)
@@ -67,13 +67,13 @@ def test_slopes_are_those_of_the_prediction(setting, name):
 
 
 def test_a_dead_time_is_a_late_clock(setting):
-    experiment, trial, values, coordinates, slopes = setting
+    experiment, values, coordinates, slopes = setting
     names = [c.name for c in coordinates]
     late, clock = (slopes[:, :, names.index(n)] for n in ("dead_time.delay_s", "clock_offset.offset_s"))
     assert late == pytest.approx(-clock)
     plain = {
         k: v for k, v in values.items() if "bias" not in k
     }  # a bias acts from time 0 whatever the valves do
-    delayed = experiment.predict(trial, Point({**plain, "dead_time.delay_s": 0.03}), (), FINE_M_S).points
-    shifted = experiment.predict(trial, Point({**plain, "clock_offset.offset_s": -0.03}), (), FINE_M_S).points
+    delayed = experiment.predict("t", Point({**plain, "dead_time.delay_s": 0.03}), (), FINE_M_S).points
+    shifted = experiment.predict("t", Point({**plain, "clock_offset.offset_s": -0.03}), (), FINE_M_S).points
     assert np.abs(delayed - shifted).max() < 1e-6

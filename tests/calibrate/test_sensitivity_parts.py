@@ -32,7 +32,7 @@ def test_the_small_structure_gives_the_slopes_of_the_full_one(setting):
     experiment, trial, base, start = setting
     model = experiment.model
     effects = tuple(c for k in all_candidates(model.links) for c in k.sizes)
-    nodes = experiment.runs["t"](start.values)
+    nodes = experiment.work.runs["t"](start.values)
     seeds = model.seeds(start.values, conditions_of(trial), base).p
     typical = np.ones(len(base))
     found = []
@@ -55,7 +55,7 @@ def test_differences_are_the_tangents_of_the_integration(setting, effects):
     values = {**start.values, **{name: sizes[name] for name in effects}}
     added = tuple(c for k in all_candidates(model.links) for c in k.sizes if c.name in effects)
     coordinates = (*base, *added)
-    nodes = experiment.runs["t"](values)
+    nodes = experiment.work.runs["t"](values)
     structure, kept = model.structure(values, coordinates)
     seeds = model.seeds(values, conditions_of(trial), coordinates).p[kept]
     typical = np.array([c.typical for c in coordinates])
@@ -81,12 +81,12 @@ def test_differences_are_the_tangents_of_the_integration(setting, effects):
 def test_slopes_of_a_calibration_are_exact(setting):
     experiment, trial, base, start = setting
     fine, h = 1e-7, 1e-4
-    slopes = experiment.predict(trial, start, base, fine).slopes
+    slopes = experiment.work.predict(trial.name, start, base, fine).slopes
     for k, coordinate in enumerate(base):
         ends = []
         for sign in (1, -1):
             moved = {**start.values, coordinate.name: start.values[coordinate.name] + sign * h}
-            ends.append(experiment.predict(trial, Point(moved), (), fine).points)
+            ends.append(experiment.work.predict(trial.name, Point(moved), (), fine).points)
         difference = (ends[0] - ends[1]) / (2 * h)
         assert np.abs(slopes[:, :, k] - difference).max() < 1e-3 * np.abs(difference).max(), coordinate.name
 

@@ -106,20 +106,19 @@ def track():
     time_s = np.arange(70) / 100
     blank = np.zeros((time_s.size, robot.links, 2))
     trial = Trial("t", 1.5, 48.0, 0.4, np.pi / 2, 0.7, 0.7, time_s, markers_m=blank)
-    return Experiment(Model(robot), [trial], 0.001), trial
+    return Experiment(Model(robot), [trial], 0.001).work
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_slopes_of_the_picture_are_those_of_differences(track, name):
-    experiment, trial = track
     fine = 2e-8
     start = start_point(fitted_coordinates(wpi_srs())).values
     form = forms_of(all_effects()[name], 5)[-1]
-    slopes = experiment.predict(trial, Point(start), form.sizes, fine).slopes
+    slopes = track.predict("t", Point(start), form.sizes, fine).slopes
     for k, c in enumerate(form.sizes):
         h = 2e-3 * c.typical
         signs = (1, -1) if c.lower < 0 else (1, 0)
-        ends = [experiment.predict(trial, Point({**start, c.name: s * h}), (), fine).points for s in signs]
+        ends = [track.predict("t", Point({**start, c.name: s * h}), (), fine).points for s in signs]
         difference = (ends[0] - ends[1]) / ((signs[0] - signs[1]) * h)
         assert np.linalg.norm(slopes[:, :, k] - difference) < 0.06 * np.linalg.norm(difference)
 

@@ -42,6 +42,19 @@ def test_with_the_true_effect_in_the_robot_file_nothing_is_missing(tmp_path, cap
     assert ["dead_time", "clock_offset"] in [p["effects"] for p in said["alike"]]
 
 
+def test_any_number_of_processes_finds_the_same_numbers(tmp_path, capsys):
+    small_set(tmp_path / "set", ("tether_drag",))
+    names = tmp_path / "names.yaml"
+    names.write_text("[tether_drag, tether_weight]\n")
+    found = []
+    for jobs in ("1", "2"):
+        given = ("--effects", names)
+        said = ask(discrepancy, tmp_path / "set", capsys, *given, out=tmp_path / "out", jobs=jobs)
+        found.append({k: v for k, v in said.items() if k != "seconds"})
+    assert found[0] == found[1]  # to the last bit
+    assert found[0]["gap"]["ratio"] is not None
+
+
 @pytest.mark.slow
 def test_two_hidden_effects_are_named_one_after_the_other(tmp_path, capsys):
     truth = small_set(tmp_path / "set", ("tether_drag", "gap_bending"), trials=12)

@@ -10,8 +10,8 @@ ROOT = Path(__file__).resolve().parents[2]
 
 # From the bottom up. A module belongs to the longest prefix that fits it.
 LAYERS = (
-    ("srs_opt", "planners", "srs_opt.errors", "srs_opt.processes", "srs_opt.plugins"),
-    ("srs_opt.files", "srs_opt.sweep"),
+    ("srs_opt", "planners", "srs_opt.errors", "srs_opt.plugins"),
+    ("srs_opt.files", "srs_opt.parallel"),
     ("srs_opt.document", "srs_opt.figures", "srs_opt.command"),
     ("srs_opt.problem", "srs_opt.table"),
     ("srs_opt.robot", "srs_opt.robots"),

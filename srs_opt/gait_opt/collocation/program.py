@@ -16,7 +16,7 @@ from srs_opt.gait_opt.collocation.layout import ROBOT_UNKNOWNS, Layout, local_in
 from srs_opt.gait_opt.collocation.point import PointKind, point_functions
 from srs_opt.gait_opt.collocation.sparse import Gather, hessian_gather, jacobian_gather, to_dm
 from srs_opt.model.registry import build
-from srs_opt.processes import interrupt_not_lost
+from srs_opt.parallel.interrupts import interrupt_not_lost
 
 _MINIMUM_DEGREE = 0  # MUMPS's ordering: quicker here than its own choice; METIS draws at random, bits differ
 # starts are simulated motions, nearly feasible: steps that leave their neighbourhood follow the linearized

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import signal
 import threading
 from collections.abc import Iterator
@@ -55,11 +54,3 @@ def interrupt_not_lost() -> Iterator[None]:
         signal.signal(signal.SIGINT, before)
     if came:
         raise KeyboardInterrupt
-
-
-def one_thread_of_linear_algebra() -> None:
-    """Keep NumPy to one thread, unless the user has said otherwise; call it before NumPy is imported.
-
-    Processes share the cores already; threads of the linear algebra would only get in their way.
-    """
-    os.environ.setdefault("OMP_NUM_THREADS", "1")

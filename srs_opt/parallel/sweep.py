@@ -1,4 +1,4 @@
-"""Sweeps over many independent items: joblib's processes, or a Dask cluster's workers, same results.
+"""Sweeps over many independent items.
 
 The work is cut into chunks in a fixed way, whatever runs them, so results do not depend on where. With a
 `Resume` every chunk's results are kept in a file until the sweep is over, so an interrupted one goes on.
@@ -6,23 +6,16 @@ The work is cut into chunks in a fixed way, whatever runs them, so results do no
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import json
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
-from srs_opt.errors import InputError
 from srs_opt.files import write_text
-from srs_opt.processes import workers_deaf_to_interrupts
-
-if TYPE_CHECKING:
-    from distributed import Client
-
-CONNECT_S = 10.0  # patience with a scheduler that does not answer
+from srs_opt.parallel.protocol import HERE, Executor
 
 SOURCES = (".py", ".json", ".yaml")
 
@@ -59,7 +52,7 @@ class Resume:
         write_text(self._file(piece), json.dumps(results))
 
     def _file(self, piece: Sequence[Any]) -> Path:
-        parts = [source_digest(Path(__file__).resolve().parent), self.key, repr(list(piece))]
+        parts = [source_digest(Path(__file__).resolve().parents[1]), self.key, repr(list(piece))]
         digest = hashlib.sha256("\0".join(parts).encode())
         return self.folder / f"{digest.hexdigest()[:32]}.json"
 
@@ -84,8 +77,7 @@ def sweep(
     items: Sequence[T],
     *,
     chunk: int,
-    jobs: int = 1,
-    cluster: str | None = None,
+    where: Executor = HERE,
     what: str = "",
     quiet: bool = True,
     resume: Resume | None = None,
@@ -100,11 +92,8 @@ def sweep(
         Takes a chunk, returns a result per item; must be picklable when it runs elsewhere.
     chunk : int
         Items per task: enough for about half a second.
-    jobs : int
-        Processes on this machine; one, or a single chunk, runs right here.
-    cluster : str, optional
-        Address of a Dask scheduler (``host:port``) that gets the chunks instead; a chunk whose worker is
-        lost goes to another.
+    where : Executor
+        Who does it.
     resume : Resume, optional
         Chunks found there are not computed again; the others are kept there as they come in.
     """
@@ -112,7 +101,7 @@ def sweep(
 
     pieces = chunks(items, chunk)
     known = {k for k, piece in enumerate(pieces) if resume is not None and resume.load(piece) is not None}
-    fresh = _run(work, [piece for k, piece in enumerate(pieces) if k not in known], jobs, cluster)
+    fresh = where.map(work, [piece for k, piece in enumerate(pieces) if k not in known])
     with tqdm(total=len(items), desc=what, disable=quiet or None, leave=False) as bar:
         for k, piece in enumerate(pieces):
             results = _recalled(resume, piece, work) if k in known else next(fresh)
@@ -126,53 +115,3 @@ def _recalled(resume: Resume | None, piece: Sequence[T], work: Callable[[Sequenc
     """Return kept results, or compute them if their file has vanished meanwhile."""
     results = None if resume is None else resume.load(piece)
     return work(piece) if results is None else results
-
-
-def _run(
-    work: Callable[[Sequence[T]], list[R]], pieces: list[Sequence[T]], jobs: int, cluster: str | None
-) -> Iterator[list[R]]:
-    if cluster is None and (jobs == 1 or len(pieces) < 2):
-        yield from map(work, pieces)
-        return
-    import joblib
-
-    with _backend(jobs, cluster):
-        parallel = joblib.Parallel(n_jobs=-1 if cluster else jobs, return_as="generator", batch_size=1)
-        with workers_deaf_to_interrupts():
-            results = parallel(joblib.delayed(work)(piece) for piece in pieces)
-        yield from results
-
-
-@contextlib.contextmanager
-def _backend(jobs: int, cluster: str | None) -> Iterator[Any]:
-    import joblib
-
-    if cluster is None:
-        from joblib.externals.loky.backend import resource_tracker
-
-        resource_tracker.ensure_running()  # it, too, ends the blocking of interrupts when it starts
-        with joblib.parallel_config("loky", n_jobs=jobs, inner_max_num_threads=1):
-            yield
-        return
-    with connect(cluster), joblib.parallel_config("dask"):
-        yield
-
-
-def connect(cluster: str) -> Client:
-    """Return a client of the Dask scheduler at `cluster`, ``host:port``; a context manager.
-
-    Raises
-    ------
-    InputError
-        If the package is missing or nobody answers there.
-    """
-    try:
-        from distributed import Client
-    except ImportError as error:
-        raise InputError("--cluster needs the package 'distributed': pip install srs-opt[cluster]") from error
-    try:
-        return Client(cluster, timeout=CONNECT_S)
-    except (OSError, ValueError, TimeoutError) as error:
-        raise InputError(
-            f"--cluster {cluster}: no Dask scheduler answers there (expected host:port)"
-        ) from error

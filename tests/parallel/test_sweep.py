@@ -8,12 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import srs_opt.sweep as sweep_module
-from srs_opt.errors import InputError
 from srs_opt.gait_map import grid
 from srs_opt.gait_map.grid import gait_map, grid_points
+from srs_opt.parallel import executor
+from srs_opt.parallel.sweep import Resume, sweep
 from srs_opt.robot import wpi_srs
-from srs_opt.sweep import Resume, sweep
 
 NUMBERS = [k / 7 for k in range(40)]
 
@@ -31,7 +30,8 @@ def counted(log, chunk):
 def test_chunks_come_in_order_whatever_runs_them():
     alone = list(sweep(third_powers, NUMBERS, chunk=7))
     assert len(alone) == 40
-    assert repr(alone) == repr(list(sweep(third_powers, NUMBERS, chunk=7, jobs=2)))
+    with executor(jobs=2) as where:
+        assert repr(alone) == repr(list(sweep(third_powers, NUMBERS, chunk=7, where=where)))
     assert list(sweep(third_powers, [], chunk=7)) == []
 
 
@@ -84,12 +84,6 @@ def test_an_interrupted_map_gives_the_same_bits(tmp_path, monkeypatch):
     assert np.array_equal(resumed.rows, whole.rows, equal_nan=True)
 
 
-def test_no_scheduler_is_a_line(monkeypatch):
-    monkeypatch.setattr(sweep_module, "CONNECT_S", 0.5)
-    with pytest.raises(InputError, match="no Dask scheduler answers"):
-        list(sweep(third_powers, NUMBERS, chunk=5, cluster="127.0.0.1:1"))
-
-
 def map_but_die_once(mark, chunk):
     """The map's work; the first worker to take the third chunk is killed."""
     if chunk[0][0] > 1.4 and not mark.exists():
@@ -107,13 +101,13 @@ def test_cluster_loses_a_worker_and_gives_the_same_bits(tmp_path):
     points.sort()
     here = np.array(grid.map_points(wpi_srs(), "complex", points[:6]))
     mark = tmp_path / "killed"
-    with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
-    ) as cluster:
-        rows = sweep(
-            partial(map_but_die_once, mark), points, chunk=6, cluster=cluster.scheduler_address, quiet=True
-        )
-        found = np.array(list(rows))
+    with (
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
+        ) as cluster,
+        executor(cluster=cluster.scheduler_address) as where,
+    ):
+        found = np.array(list(sweep(partial(map_but_die_once, mark), points, chunk=6, where=where)))
     assert mark.exists()
     expected = [grid.map_points(wpi_srs(), "complex", points[k : k + 6]) for k in range(0, 30, 6)]
     assert np.array_equal(found, np.concatenate([np.array(e) for e in expected]), equal_nan=True)

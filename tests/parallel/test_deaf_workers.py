@@ -20,13 +20,15 @@ def deaf(items):
 """
 SWEEP = """
 from deaf import deaf
-from srs_opt.sweep import sweep
-print(all(sweep(deaf, range(6), chunk=1, jobs=2)))
+from srs_opt.parallel import executor
+from srs_opt.parallel.sweep import sweep
+with executor(2) as where:
+    print(all(sweep(deaf, range(6), chunk=1, where=where)))
 """
 SPAWNED = """
 from multiprocessing import get_context
 from deaf import deaf
-from srs_opt.processes import workers_deaf_to_interrupts
+from srs_opt.parallel.interrupts import workers_deaf_to_interrupts
 if __name__ == "__main__":
     with workers_deaf_to_interrupts():
         pool = get_context("spawn").Pool(2)

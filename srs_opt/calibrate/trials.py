@@ -1,0 +1,246 @@
+"""Trials that are simulated again and again: each goes on from its own last mesh, slopes and motion.
+
+What a trial answers depends on its own earlier requests only, not on those of others, nor on their failures:
+so the answers are the same to the last bit whoever simulates which trials.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+
+import numpy as np
+
+from srs_opt.calibrate.coordinates import SCATTER_SD, Coordinate
+from srs_opt.calibrate.gram import TrialGram, trial_gram
+from srs_opt.calibrate.model import Model
+from srs_opt.calibrate.noise import track_of
+from srs_opt.calibrate.nominal import ATTEMPTS, Meshes, Nodes, TrialRun
+from srs_opt.calibrate.observe import Prediction, predict
+from srs_opt.errors import NoAnswerError
+from srs_opt.measurement.records import Trial
+from srs_opt.robot import Robot
+from srs_opt.simulate.together import together
+
+AT_ONCE = 48  # trials whose motions are in memory together: enough to fill the lanes
+ROUGHER = 5.0  # times the tolerance, for fits whose misfit hides it
+Extra = Callable[[Trial, Prediction], np.ndarray]
+Slopes = tuple[tuple[str, ...], np.ndarray]  # coordinates, and a trial's slopes (n, K) in single precision
+Place = tuple[bool, dict[str, float]]  # where a trial was simulated: roughly or not, the values
+Memory = tuple[Meshes, Place | None, Slopes | None]
+Answer = TrialGram | np.ndarray | NoAnswerError
+
+
+@dataclass(frozen=True)
+class Point:
+    """Where a model stands: shared coordinates and every trial's scatter.
+
+    Attributes
+    ----------
+    values : dict
+        Coordinate -> value.
+    scatter : dict
+        Trial name -> array of log factors on friction along, across and curvature.
+    """
+
+    values: dict[str, float]
+    scatter: dict[str, np.ndarray] = field(default_factory=dict)
+
+    def of_trial(self, name: str) -> dict[str, float]:
+        """Return the values with the trial's own scatter added."""
+        own = dict(self.values)
+        for parameter, b in zip(SCATTER_SD, self.scatter.get(name, np.zeros(len(SCATTER_SD)))):
+            own[parameter] = own.get(parameter, 0.0) + float(b)
+        return own
+
+
+@dataclass(frozen=True)
+class Request:
+    """What is asked of the trials.
+
+    Attributes
+    ----------
+    point : Point
+    coordinates : tuple of Coordinate, optional
+        By which the motions are derived for Gram matrices; the scattering parameters are among them. Without,
+        the residuals are asked for.
+    extra : callable, optional
+        Residual functions, as further columns.
+    stale : bool
+        Whether slopes of the last request for the same coordinates serve.
+    rough : bool
+        Whether the motions need not be better than a model can say that leaves a plain misfit.
+    """
+
+    point: Point
+    coordinates: tuple[Coordinate, ...] | None = None
+    extra: Extra | None = None
+    stale: bool = False
+    rough: bool = False
+
+
+class Trials:
+    """Trials held against a model, with what they need to go on: a `parallel.Work`.
+
+    Parameters
+    ----------
+    model : Model
+    trials : sequence of Trial
+    sd_m : float
+        Noise per coordinate.
+    tolerance_m_s : float
+        Of the simulation.
+    keeps : bool
+        Whether slopes and motions are kept for the next request.
+    """
+
+    def __init__(
+        self, model: Model, trials: Sequence[Trial], sd_m: float, tolerance_m_s: float, *, keeps: bool
+    ) -> None:
+        self.model, self.sd_m, self.tolerance_m_s, self.keeps = model, sd_m, tolerance_m_s, keeps
+        self._trials = {t.name: t for t in trials}
+        self.runs = {t.name: TrialRun(model, t) for t in trials}
+        self._tracks = {t.name: track_of(t) for t in trials}
+        self._slopes: dict[str, Slopes] = {}
+        self._new_slopes: set[str] = set()
+        self._motions: dict[str, tuple[Place, Nodes]] = {}
+        self._last: dict[str, Place] = {}
+        self._scatter_sd = np.array(list(SCATTER_SD.values()))
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Travel without the compiled model and without what was found."""
+        model = self.model.robot, self.model.full.model
+        trials = tuple(self._trials.values())
+        return _restored, (*model, trials, self.sd_m, self.tolerance_m_s, self.keeps)
+
+    def part(self, names: Sequence[str]) -> Trials:
+        """Return these trials alone, as if nothing had been asked."""
+        trials = [self._trials[n] for n in names]
+        return Trials(self.model, trials, self.sd_m, self.tolerance_m_s, keeps=self.keeps)
+
+    def memory(self, names: Sequence[str], request: Request | None) -> dict[str, Memory]:
+        """Return what the trials go on from: with slopes if `request` uses them, or those that are new."""
+        wanted = self._new_slopes if request is None else set(names if request.stale else ())
+        return {
+            n: (self.runs[n].meshes, self._last.get(n), self._slopes.get(n) if n in wanted else None)
+            for n in names
+        }
+
+    def remember(self, memory: Mapping[str, Memory]) -> None:
+        """Go on from there."""
+        for name, (meshes, last, slopes) in memory.items():
+            self.runs[name].meshes = dict(meshes)
+            self._motions.pop(name, None)
+            if last is not None:
+                self._last[name] = last
+            if slopes is not None:
+                self._slopes[name] = slopes
+        self._new_slopes = set()
+
+    def answer(self, names: Sequence[str], request: Request) -> dict[str, Answer]:
+        """Return the trials' Gram matrices or residuals (T, 2 M), or why there are none; side by side."""
+        found: dict[str, Answer] = {}
+        for first in range(0, len(names), AT_ONCE):
+            some = names[first : first + AT_ONCE]
+            for name, nodes in self._simulated(some, request.point, rough=request.rough).items():
+                found[name] = nodes if isinstance(nodes, NoAnswerError) else self._seen(name, nodes, request)
+        return found
+
+    def predict(
+        self,
+        name: str,
+        point: Point,
+        coordinates: Sequence[Coordinate] = (),
+        tolerance_m_s: float | None = None,
+    ) -> Prediction:
+        """Return the prediction of one trial at `point`."""
+        nodes = self.runs[name](point.of_trial(name), tolerance_m_s or self.tolerance_m_s)
+        return self._predicted(name, nodes, point, coordinates)
+
+    def _predicted(
+        self, name: str, nodes: Nodes, point: Point, coordinates: Sequence[Coordinate]
+    ) -> Prediction:
+        trial, values = self._trials[name], point.of_trial(name)
+        centre_only = trial.markers_m is None
+        return predict(self.model, trial, nodes, values, coordinates, centre_only=centre_only)
+
+    def _simulated(
+        self, names: Sequence[str], point: Point, *, rough: bool
+    ) -> dict[str, Nodes | NoAnswerError]:
+        """Return the trials' motions at `point`.
+
+        One that was simulated there last is not simulated anew; where its motion was not kept, its last
+        meshes serve as they are, which gives the same bits.
+        """
+        default = self.model.default
+        wanted: dict[str, Place] = {
+            n: (rough, {k: v for k, v in point.of_trial(n).items() if v != default(k)}) for n in names
+        }
+        known: dict[str, Nodes | NoAnswerError] = {}
+        for n in names:
+            if n in self._motions and self._motions[n][0] == wanted[n]:
+                known[n] = self._motions[n][1]
+        tolerance = self.tolerance_m_s * (ROUGHER if rough else 1.0)
+        rest = [n for n in names if n not in known]
+        attempts = [1 if self._last.get(n) == wanted[n] else ATTEMPTS for n in rest]
+        searches = [self.runs[n].search(point.of_trial(n), tolerance, a) for n, a in zip(rest, attempts)]
+        for name, nodes in zip(rest, together(searches)):
+            known[name] = nodes
+            self._motions.pop(name, None)
+            self._last.pop(name, None)
+            if not isinstance(nodes, NoAnswerError):
+                self._last[name] = wanted[name]
+                if self.keeps:
+                    self._motions[name] = wanted[name], nodes
+        return {n: known[n] for n in names}
+
+    def _seen(self, name: str, nodes: Nodes, request: Request) -> TrialGram | np.ndarray:
+        track = self._tracks[name]
+        assert track is not None
+        if request.coordinates is None:
+            return np.asarray(track - self._predicted(name, nodes, request.point, ()).points)
+        point, extra = request.point, request.extra
+        names = tuple(c.name for c in request.coordinates)
+        kept = self._slopes.get(name)
+        stale = request.stale and kept is not None and kept[0] == names
+        prediction = self._predicted(name, nodes, point, () if stale else request.coordinates)
+        residual = np.asarray(track - prediction.points)
+        if stale:
+            assert kept is not None
+            slopes = kept[1]
+        else:
+            slopes = prediction.slopes.reshape(residual.size, -1)
+            if self.keeps and extra is None:
+                self._slopes[name] = names, slopes.astype(np.float32)
+                self._new_slopes.add(name)
+        if extra is not None:
+            further = extra(self._trials[name], prediction).reshape(residual.size, -1)
+            slopes = np.column_stack([slopes, further])
+        scattered = [names.index(n) for n in SCATTER_SD]
+        now = point.scatter.get(name, np.zeros(len(SCATTER_SD)))
+        gram = trial_gram(residual.ravel(), slopes, self.sd_m, scattered, self._scatter_sd, now)
+        return replace(gram, serial=serial_correlation(residual / self.sd_m), stale=stale)
+
+
+def serial_correlation(residual: np.ndarray, lags: int = 8) -> float:
+    """Return the standardised sum of products of residuals (T, n) up to `lags` frames apart (NaN: lost)."""
+    total, count = 0.0, 0
+    for lag in range(1, min(lags, residual.shape[0] - 1) + 1):
+        products = residual[lag:] * residual[:-lag]
+        seen = np.isfinite(products)
+        total += float(products[seen].sum())
+        count += int(seen.sum())
+    return total / math.sqrt(count) if count else 0.0
+
+
+@lru_cache(maxsize=4)
+def _model(robot: Robot, model: str) -> Model:
+    return Model(robot, model)
+
+
+def _restored(
+    robot: Robot, model: str, trials: Sequence[Trial], sd_m: float, tolerance_m_s: float, keeps: bool
+) -> Trials:
+    return Trials(_model(robot, model), trials, sd_m, tolerance_m_s, keeps=keeps)
