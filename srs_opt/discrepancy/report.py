@@ -12,6 +12,7 @@ from srs_opt.discrepancy.pictures import Picture, pictures
 from srs_opt.discrepancy.pipeline import Discrepancy
 from srs_opt.discrepancy.verdict import NAMED, NAMED_IN_PART, NO_GAP, NOT_TESTABLE, ONE_OF, UNKNOWN
 from srs_opt.files import write_text
+from srs_opt.model.effects import all_effects
 
 HEADLINES = {
     NO_GAP: "No gap: the calibrated model explains these data",
@@ -50,6 +51,7 @@ def write_report(
     page = template.render(
         headline=HEADLINES[record["verdict"]].format(names=" or ".join(n for n in names if n)),
         answer=record,
+        words=all_effects(),
         dataset=found.dataset,
         split=found.split,
         calibrated=_parameters(found),
