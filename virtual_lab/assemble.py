@@ -115,7 +115,7 @@ _GROUND_SLOTS = {
     },
     "hose_torsion": {"torque_n_m": kernel.TORSION},
     "carpet_edge": {"extra": kernel.CARPET, "edge_m": kernel.CARPET_EDGE},
-    "ratchet_wheels": {"extra": kernel.RATCHET},
+    "reverse_friction": {"excess": kernel.REVERSE},
     "sideways_stiction": {"excess": kernel.STICTION, "speed": kernel.STICTION_SPEED},
     "bend_unloads": {"per_curv": kernel.UNLOADING},
     "bend_steers": {"per_curv": kernel.STEER},
@@ -203,7 +203,7 @@ def fastest_decay(links: np.ndarray, ground: np.ndarray) -> float:
     The body moves as one, so no motion of it decays faster than a single link would alone.
     """
     grip = 1.0 + max(ground[kernel.CARPET], 0.0)
-    along = links[:, kernel.MU_T] * (1.0 + ground[kernel.STRIBECK]) * (1.0 + max(ground[kernel.RATCHET], 0.0))
+    along = links[:, kernel.MU_T] * (1.0 + ground[kernel.STRIBECK]) * (1.0 + max(ground[kernel.REVERSE], 0.0))
     along *= grip
     across = links[:, kernel.MU_N] * (1.0 + ground[kernel.STICTION])
     damping = links[:, kernel.LOAD] * np.maximum(along, across) / ground[kernel.SMOOTHING]

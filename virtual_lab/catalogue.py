@@ -11,7 +11,7 @@ Those in no list:
 - carpet_edge: mu_t times 1 + extra where the place along `direction` exceeds edge_m (blurred over 1 cm);
 - floor_waves: a floor of slope ``slope cos(2 pi s / wavelength)`` along `direction`;
 - worn_wheels: mu_n changes evenly along the body, by `gradient` in all, more at the head when positive;
-- ratchet_wheels: mu_t times 1 + extra when rolling backwards;
+- reverse_friction: mu_t times 1 + excess when rolling backwards;
 - sideways_stiction: the term across the wheels times 1 + excess exp(-(v_n/speed)^2);
 - bend_unloads: normal force times 1 - per_curv |mean curvature of the neighbouring segments|, at least 0;
 - bend_steers: wheels turn by per_curv times that mean curvature;
@@ -113,7 +113,7 @@ _UNLISTED = (
     _unlisted("carpet_edge", "extra direction edge_m", 2.0, False, "room", edge_m=0.08),
     _unlisted("floor_waves", "slope wavelength_m direction", 0.02, False, "room", wavelength_m=0.25),
     _unlisted("worn_wheels", "gradient", 0.8, True, "wheels"),
-    _unlisted("ratchet_wheels", "extra", 6.0, False, "wheels"),
+    _unlisted("reverse_friction", "excess", 6.0, False, "wheels"),
     _unlisted("sideways_stiction", "excess speed", 0.6, False, "wheels", speed=0.03),
     _unlisted("bend_unloads", "per_curv", 0.025, False, "wheels"),
     _unlisted("bend_steers", "per_curv", 0.006, True, "wheels"),

@@ -28,7 +28,7 @@ CHAIN_COLUMNS = 11
 (
     SMOOTHING, CONE, ROLL_DAMPING, STRIBECK, STRIBECK_SPEED, SLIP, TETHER_DRAG, TETHER_DAMPING,
     PULL, PULL_X, PULL_Y, SLOPE_X, SLOPE_Y, QUADRATIC, HOSE, HOSE_X, HOSE_Y, HOSE_SLACK,
-    CARPET, CARPET_EDGE, CARPET_X, CARPET_Y, RATCHET, WAVE, WAVE_NUMBER, WAVE_X, WAVE_Y,
+    CARPET, CARPET_EDGE, CARPET_X, CARPET_Y, REVERSE, WAVE, WAVE_NUMBER, WAVE_X, WAVE_Y,
     STICTION, STICTION_SPEED, UNLOADING, STEER, TORSION, PLACES, GAP, GAP_RATIO,
 ) = range(35)  # fmt: skip
 GROUND_SIZE = 35
@@ -187,8 +187,8 @@ def wheel_force(vt, vn, load, mu_t, mu_n, ground):
         along, across = mu_t * smooth_sign(vt / vs), mu_n * smooth_sign(vn / vs)
     if ground[STRIBECK] != 0.0:
         along *= 1.0 + ground[STRIBECK] * math.exp(-((vt / ground[STRIBECK_SPEED]) ** 2))
-    if ground[RATCHET] != 0.0 and vt < 0.0:
-        along *= 1.0 + ground[RATCHET]
+    if ground[REVERSE] != 0.0 and vt < 0.0:
+        along *= 1.0 + ground[REVERSE]
     across *= 1.0 + ground[SLIP] * abs(vn)
     if ground[STICTION] != 0.0:
         across *= 1.0 + ground[STICTION] * math.exp(-((vn / ground[STICTION_SPEED]) ** 2))

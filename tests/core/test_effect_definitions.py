@@ -66,9 +66,9 @@ def with_effects(*names, **changes):
     return wpi_srs().with_values(effects=effects, **changes)
 
 
-def test_the_list_is_the_packages_list():
+def test_the_package_knows_the_list():
     known = all_effects()
-    assert set(known) == set(LISTED)
+    assert set(known) >= set(LISTED)  # the others are held against the virtual laboratory
     for name, values in LISTED.items():
         assert [p.name for p in known[name].parameters] == list(values)
         assert known[name].size.name == next(iter(values))
