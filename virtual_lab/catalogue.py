@@ -11,7 +11,6 @@ Those in no list:
 - carpet_edge: mu_t times 1 + extra where the place along `direction` exceeds edge_m (blurred over 1 cm);
 - floor_waves: a floor of slope ``slope cos(2 pi s / wavelength)`` along `direction`;
 - worn_wheels: mu_n changes evenly along the body, by `gradient` in all, more at the head when positive;
-- reverse_friction: mu_t times 1 + excess when rolling backwards;
 - sideways_stiction: the term across the wheels times 1 + excess exp(-(v_n/speed)^2);
 - bend_unloads: normal force times 1 - per_curv |mean curvature of the neighbouring segments|, at least 0;
 - bend_steers: wheels turn by per_curv times that mean curvature;
@@ -94,6 +93,7 @@ _LISTED = (
     _listed("hysteresis", "ratio width", 0.35, False, "bending", width=4.0),
     _listed("viscous_rolling", "damping", 0.06, False, "wheels"),
     _listed("stribeck", "excess speed", 1.0, False, "wheels", speed=0.08),
+    _listed("reverse_friction", "excess", 1.0, False, "wheels"),
     _listed("slip_rate", "per_speed", 8.0, False, "wheels"),
     _listed("floor_slope", "angle direction", 0.006, False, "room"),
     _listed("head_mass", "extra_kg", 0.02, True, "body"),
@@ -113,7 +113,6 @@ _UNLISTED = (
     _unlisted("carpet_edge", "extra direction edge_m", 2.0, False, "room", edge_m=0.08),
     _unlisted("floor_waves", "slope wavelength_m direction", 0.02, False, "room", wavelength_m=0.25),
     _unlisted("worn_wheels", "gradient", 0.8, True, "wheels"),
-    _unlisted("reverse_friction", "excess", 6.0, False, "wheels"),
     _unlisted("sideways_stiction", "excess speed", 0.6, False, "wheels", speed=0.03),
     _unlisted("bend_unloads", "per_curv", 0.025, False, "wheels"),
     _unlisted("bend_steers", "per_curv", 0.006, True, "wheels"),
