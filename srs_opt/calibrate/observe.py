@@ -35,12 +35,15 @@ class Prediction:
         Derivatives by the coordinates asked for.
     pose, kappa : array (T, 3), (T, N-1)
         Motion at the frames.
+    free : array (T, 2 M, 4) or None
+        Derivatives by a trial's own pose and clock, where these are fitted to its track.
     """
 
     points: np.ndarray
     slopes: np.ndarray
     pose: np.ndarray
     kappa: np.ndarray
+    free: np.ndarray | None = None
 
 
 @lru_cache(maxsize=8)

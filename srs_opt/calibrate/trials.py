@@ -9,10 +9,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 
+from srs_opt.calibrate.alignment import FREE, align, without
 from srs_opt.calibrate.coordinates import SCATTER_SD, Coordinate
 from srs_opt.calibrate.gram import TrialGram, trial_gram
 from srs_opt.calibrate.model import Model
@@ -163,8 +164,20 @@ class Trials:
         self, name: str, nodes: Nodes, point: Point, coordinates: Sequence[Coordinate]
     ) -> Prediction:
         trial, values = self._trials[name], point.of_trial(name)
-        centre_only = trial.markers_m is None
-        return predict(self.model, trial, nodes, values, coordinates, centre_only=centre_only)
+        seen_of = partial(predict, self.model, centre_only=trial.markers_m is None)
+        track = self._tracks[name]
+        if not trial.moving or track is None:
+            return seen_of(trial, nodes, values, coordinates)
+
+        def later(shift_s: float) -> Trial:
+            return replace(trial, time_s=trial.time_s + shift_s)
+
+        most = min(0.5 * trial.period_s, float(trial.time_s[0]))
+        found, free = align(track, lambda shift: seen_of(later(shift), nodes, values).points, most)
+        raw = seen_of(later(found.later_s), nodes, values, coordinates)
+        return Prediction(
+            found.points(raw.points), found.slopes(raw.slopes), found.pose(raw.pose), raw.kappa, free
+        )
 
     def _simulated(
         self, names: Sequence[str], point: Point, *, rough: bool
@@ -218,10 +231,15 @@ class Trials:
         if extra is not None:
             further = extra(self._trials[name], prediction).reshape(residual.size, -1)
             slopes = np.column_stack([slopes, further])
+        if prediction.free is not None:
+            own = prediction.free.reshape(residual.size, -1)
+            slopes = without(slopes, own, np.isfinite(residual.ravel()))
         scattered = [names.index(n) for n in SCATTER_SD]
         now = point.scatter.get(name, np.zeros(len(SCATTER_SD)))
         gram = trial_gram(residual.ravel(), slopes, self.sd_m, scattered, self._scatter_sd, now)
-        return replace(gram, serial=serial_correlation(residual / self.sd_m), stale=stale)
+        fitted = 0 if prediction.free is None else FREE
+        serial = serial_correlation(residual / self.sd_m)
+        return replace(gram, count=gram.count - fitted, serial=serial, stale=stale)
 
 
 def serial_correlation(residual: np.ndarray, lags: int = 8) -> float:

@@ -128,6 +128,7 @@ def proposals(experiment: Experiment, trials: Sequence[Trial]) -> Mapping[str, T
         centre_m=None,
         duration_s=_SECONDS,
         schedule=None,
+        moving=False,
     )
     segments = experiment.model.segments
     steps = Schedule("step", 2.0, ((1, 0.0, 1.0),))

@@ -86,7 +86,7 @@ def brief_name(name: str) -> str:
 
 
 def _first_seconds(trial: Trial) -> Trial:
-    seen = trial.time_s <= BRIEF_S
+    seen = trial.time_s - trial.time_s[0] <= BRIEF_S
     markers = None if trial.markers_m is None else trial.markers_m[seen]
     centre = None if trial.centre_m is None else trial.centre_m[seen]
     return replace(

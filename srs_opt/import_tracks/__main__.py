@@ -5,8 +5,12 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from srs_opt.command import Answer, Parser, finite_float, make_parser, positive_float, run_command, say
+
+if TYPE_CHECKING:
+    from srs_opt.measurement.importing import TrialNote
 
 
 def build_parser() -> Parser:
@@ -122,6 +126,7 @@ def run(options: argparse.Namespace) -> Answer:
                 "valve_start_sd_s": note.valve_start_sd_s,
                 "lost_fraction": note.lost_fraction,
                 "ghosts": note.ghosts,
+                "begins_moving": note.moving,
                 "warnings": list(note.warnings),
             }
             for note in notes
@@ -130,12 +135,16 @@ def run(options: argparse.Namespace) -> Answer:
     }
     lines = [
         f"  {n.trial}: valves start at {n.valve_start_s:.4f} s of take '{n.take}'"
-        + (f" (sd {n.valve_start_sd_s:.4f} s, found from the first motion)" if n.valve_start_sd_s else "")
+        + (f" (sd {n.valve_start_sd_s:.4f} s, found from the {_seen_in(n)})" if n.valve_start_sd_s else "")
         + f", {100 * n.lost_fraction:.1f} % lost, {n.ghosts} ghosts"
         for n in notes
     ]
     summary = "\n".join([f"{len(notes)} trials imported, noise {1e3 * dataset.marker_sd_m:.2f} mm", *lines])
     return Answer(record, summary, good=not errors, files=(options.out / "dataset.yaml",))
+
+
+def _seen_in(note: TrialNote) -> str:
+    return "phase of the bends, after a run-in before the take" if note.moving else "first motion"
 
 
 if __name__ == "__main__":

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 
 from srs_opt.errors import InputError
 from srs_opt.measurement.chain import Chain
-from srs_opt.measurement.records import Array, Schedule, Trial
+from srs_opt.measurement.onset import Gait, Onset
+from srs_opt.measurement.records import Array, Trial
 from srs_opt.measurement.takes.take import Take
 from srs_opt.problem import Report
 from srs_opt.table import Row
@@ -22,15 +24,20 @@ def cut_trial(
     row: Row,
     chain: Chain,
     tracks: Array,
-    start: float,
-    report: Report,
-    schedule: Schedule | None,
+    onset: Onset,
+    gait: Gait,
 ) -> Trial:
-    """Cut the trial out of the take: from the valves' start, tail at the origin, room axes kept."""
+    """Cut the trial out of the take: from the valves' start, tail at the origin, room axes kept.
+
+    A take that begins in mid-gait is kept from its first frame, which is labelled with the time since the
+    valves started or may be taken to have.
+    """
+    report, start = Report(Path(".")), onset.time_s
     step = 1 / source.rate_hz
     time = source.time_s - start
     duration = row.number("duration_s", report, math.inf)
-    window = (time >= -0.5 * step) & (time < duration - 0.5 * step)
+    begin = float(time[0]) if onset.moving else 0.0
+    window = (time >= begin - 0.5 * step) & (time < begin + duration - 0.5 * step)
     if window.sum() < 4:
         raise InputError(f"{source.source}: the valves start at {start:g} s, after the take's end")
     rest = tracks[source.time_s <= max(start, source.time_s[4])]
@@ -38,25 +45,23 @@ def cut_trial(
     if not seen[[0, -1]].all():
         raise InputError(f"{source.source}: tail or head is not seen before the valves start")
     tail, heading = _resting_pose(chain, np.stack([np.nanmedian(rest[:, i], axis=0) for i in (0, -1)]))
-    values = {name: row.number(name, report, 0.0) for name in SETTINGS}
-    if schedule is not None and values["frequency_hz"] <= 0:
-        values["frequency_hz"] = 1 / schedule.period_s
     return Trial(
         name=row.text("trial"),
-        frequency_hz=values["frequency_hz"],
-        pressure_kpa=values["pressure_kpa"],
-        offset=values["offset"],
-        phase_lag_rad=values["phase_lag_rad"],
+        frequency_hz=gait.frequency_hz,
+        pressure_kpa=gait.pressure_kpa,
+        offset=gait.offset,
+        phase_lag_rad=gait.phase_lag_rad,
         heading_rad=heading,
-        duration_s=round(float(time[window][-1]) + step, 6),
+        duration_s=round(float(time[window][-1]) - begin + step, 6),
         time_s=time[window],
         markers_m=tracks[window] - tail,
-        schedule=schedule,
+        schedule=gait.schedule,
         tether=row.yes("tether", True, report),
         floor=row.text("floor") or None,
         replicate_of=row.text("replicate_of") or None,
         kind=row.text("kind") or "gait",
         spots=chain.spots,
+        moving=onset.moving,
     )
 
 
@@ -72,7 +77,7 @@ def _resting_pose(chain: Chain, ends: Array) -> tuple[Array, float]:
 def check_rest(trial: Trial, warnings: list[str]) -> None:
     """The fits take a robot for straight and at rest when its valves start."""
     points = trial.markers_m
-    if points is None or trial.kind != "gait":
+    if points is None or trial.kind != "gait" or trial.moving:
         return
     chords = np.diff(points[:3], axis=1)
     angle = np.arctan2(chords[..., 1], chords[..., 0])
@@ -80,7 +85,7 @@ def check_rest(trial: Trial, warnings: list[str]) -> None:
     if np.isfinite(bends).any() and float(np.nanmax(bends)) > MOST_BENT_RAD:
         warnings.append(
             f"the robot is bent by {np.nanmax(bends):.2g} rad at the valves' start: the fits "
-            "take it for straight and at rest then (a take that begins in mid-gait does not fit)"
+            "take it for straight and at rest then (if it was in mid-gait, give an earlier valve_start_s)"
         )
 
 

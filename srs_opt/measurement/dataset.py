@@ -124,8 +124,16 @@ def _write_trials(trials: Sequence[Trial], path: Path) -> None:
         "floor": [t.floor or "" for t in trials],
         "replicate_of": [t.replicate_of or "" for t in trials],
         "kind": [t.kind for t in trials],
+        "start": ["moving" if t.moving else "rest" for t in trials],
     }
-    usual = {"schedule": {""}, "tether": {"yes"}, "floor": {""}, "replicate_of": {""}, "kind": {"gait"}}
+    usual = {
+        "schedule": {""},
+        "tether": {"yes"},
+        "floor": {""},
+        "replicate_of": {""},
+        "kind": {"gait"},
+        "start": {"rest"},
+    }
     used = {name: cells for name, cells in optional.items() if set(cells) != usual[name]}
     rows = (
         [

@@ -9,10 +9,12 @@ import numpy as np
 
 from srs_opt.errors import InputError
 from srs_opt.measurement.chain import Chain
+from srs_opt.measurement.frequency import bends_of
 from srs_opt.measurement.records import Array
 
 CLEAR = 0.3  # of sin(lag): phases that differ by less in the mean do not tell
 FEWEST_CYCLES = 1.5
+LEFT = 0.6  # share of the bends that harmonics and noise may leave
 
 
 def head_first(
@@ -71,17 +73,16 @@ def _by_phase(time_s: Array, tracks: Array, frequency_hz: float, lag_rad: float)
     """Tell by the mean phase step of neighbouring bends; None where it cannot be told."""
     if frequency_hz <= 0 or abs(math.sin(lag_rad)) < 0.1 or tracks.shape[1] < 4:
         return None
-    chords = np.diff(tracks, axis=1)
-    angle = np.arctan2(chords[..., 1], chords[..., 0])
-    bends = np.mod(np.diff(angle, axis=1) + np.pi, 2 * np.pi) - np.pi
     waves = []
-    for bend in bends.T:
+    for bend in bends_of(tracks).T:
         seen = np.isfinite(bend)
         if not seen.any() or np.ptp(time_s[seen]) * frequency_hz < FEWEST_CYCLES:
             return None
         wave = 2 * np.pi * frequency_hz * time_s[seen]
         basis = np.column_stack([np.sin(wave), np.cos(wave), np.ones_like(wave)])
-        a, b, _ = np.linalg.lstsq(basis, bend[seen], rcond=None)[0]
+        (a, b, mean), left = np.linalg.lstsq(basis, bend[seen], rcond=None)[:2]
+        if left.size and left[0] > LEFT * float(((bend[seen] - mean) ** 2).sum()):
+            return None  # not the frequency of these bends
         waves.append(complex(a, b))
     steps = [w * np.conj(v) for v, w in pairwise(waves)]
     size = sum(abs(step) for step in steps)

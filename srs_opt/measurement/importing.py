@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -14,9 +15,18 @@ from srs_opt.measurement.chain import Chain, chain_of
 from srs_opt.measurement.cutting import SETTINGS, check_rest, check_turn, cut_trial
 from srs_opt.measurement.direction import head_first
 from srs_opt.measurement.find_chain import best_start, symmetric
+from srs_opt.measurement.frequency import far_frequency, seen_frequency
 from srs_opt.measurement.ground import ground_axes, to_ground, without_ghosts
 from srs_opt.measurement.labels import follow, take
-from srs_opt.measurement.onset import Gait, find_onset, noise_sd
+from srs_opt.measurement.onset import (
+    QUIET_FRAMES,
+    Gait,
+    Onset,
+    find_onset,
+    first_motion,
+    noise_sd,
+    run_in_s,
+)
 from srs_opt.measurement.read import parse_schedule
 from srs_opt.measurement.records import KINDS, Array, Bench, Check, DataSet, Schedule, Trial
 from srs_opt.measurement.spots import Spots
@@ -37,6 +47,7 @@ OPTIONAL = (
     "replicate_of",
     "kind",
 )
+SETTLED_S = 0.6  # after the first motion the bends repeat from cycle to cycle within their noise
 SAME_RATE = 1e-3  # rates found from rounded times differ by less
 SCALES = ((1.0, "metres"), (1e-3, "millimetres"), (1e-2, "centimetres"), (0.0254, "inches"))
 
@@ -80,6 +91,7 @@ class TrialNote:
     lost_fraction: float
     ghosts: int
     warnings: tuple[str, ...]
+    moving: bool = False
 
 
 def read_trial_list(path: Path) -> list[Row]:
@@ -160,7 +172,7 @@ def import_takes(
         notes.append(note)
     sds = [noise_sd(t.markers_m) for t in trials if t.markers_m is not None]
     sd = options.marker_sd_m or max(float(np.median(sds)), 1e-6)
-    spreads = [n.valve_start_sd_s for n in notes if n.valve_start_sd_s is not None]
+    spreads = [n.valve_start_sd_s for n in notes if n.valve_start_sd_s is not None and not n.moving]
     checks = (Check("clock_alignment_s", 0.0, float(np.median(spreads))),) if spreads else ()
     dataset = DataSet(
         name=name,
@@ -211,23 +223,39 @@ def import_trial(
     tracks = take(cloud, owners)
     report = Report(Path("."))
     ends = (labels[order[0]], labels[order[-1]])
-    frequency, lag = (row.number(name, report, 0.0) for name in ("frequency_hz", "phase_lag_rad"))
-    backwards = head_first(chain, ends, source.time_s, tracks, frequency, lag, options.head_marker, warnings)
+    values = [row.number(name, report, 0.0) for name in SETTINGS]
+    if schedule is not None:
+        values[0] = 1 / schedule.period_s
+    gait = _seen_gait(
+        Gait(values[0], values[1], values[2], values[3], schedule), source.time_s, tracks, warnings
+    )
+    backwards = head_first(
+        chain,
+        ends,
+        source.time_s,
+        tracks,
+        gait.frequency_hz,
+        gait.phase_lag_rad,
+        options.head_marker,
+        warnings,
+    )
     if backwards and symmetric(chain):
         tracks = np.ascontiguousarray(tracks[:, ::-1])
     elif backwards:
         warnings.append("the markers' spacing says which end is the tail, and their motion says otherwise")
-    start, start_sd = _valve_start(source, row, robot, tracks, options, schedule, warnings)
-    if start < source.time_s[0] - 0.5 / source.rate_hz:
+    onset = _valve_start(source, row, robot, tracks, options, gait, warnings)
+    if onset.moving:
         warnings.append(
-            f"the take begins {source.time_s[0] - start:.3g} s after the valves: "
-            "calibrate and discrepancy take the robot for straight and at rest when they start"
+            "the take begins in mid-gait: the fits let the robot run in, and fit where it was and the phase"
         )
-    trial = cut_trial(source, row, chain, tracks, start, report, schedule)
+    trial = cut_trial(source, row, chain, tracks, onset, gait)
     check_rest(trial, warnings)
     check_turn(trial, warnings)
     ghosts = seen - int((owners >= 0).sum())
-    note = TrialNote(trial.name, source.name, start, start_sd, trial.lost_fraction, ghosts, tuple(warnings))
+    sd = None if math.isnan(onset.sd_s) else onset.sd_s
+    note = TrialNote(
+        trial.name, source.name, onset.time_s, sd, trial.lost_fraction, ghosts, tuple(warnings), trial.moving
+    )
     return trial, note
 
 
@@ -298,25 +326,47 @@ def _valve_start(
     robot: Robot,
     tracks: Array,
     options: ImportOptions,
-    schedule: Schedule | None,
+    gait: Gait,
     warnings: list[str],
-) -> tuple[float, float | None]:
-    if row.text("valve_start_s"):
-        return float(row.text("valve_start_s")), None
-    if options.valve_start_s is not None:
-        return options.valve_start_s, None
+) -> Onset:
+    """Return when the valves started, or, where a take begins in motion, may be taken to have started."""
     if row.text("kind") in ("still", "tow", "push"):
-        return 0.0, None
-    values = [row.number(name, Report(Path(".")), 0.0) for name in SETTINGS]
-    if schedule is not None:
-        values[0] = 1 / schedule.period_s
-    onset = find_onset(
-        robot,
-        Gait(values[0], values[1], values[2], values[3], schedule),
-        source.time_s,
-        tracks,
-        options.spots,
-    )
+        return Onset(0.0, math.nan)
+    first = float(source.time_s[0])
+    told = float(row.text("valve_start_s")) if row.text("valve_start_s") else options.valve_start_s
+    if told is not None:
+        moving = told < first - 0.5 / source.rate_hz
+        if moving and gait.frequency_hz > 0:  # whole cycles that left no trace need not be simulated
+            spare = first - told - run_in_s(gait.frequency_hz)
+            told += max(0, math.floor(spare * gait.frequency_hz)) / gait.frequency_hz
+        return Onset(told, math.nan, moving=moving)
+    onset = find_onset(robot, gait, source.time_s, tracks, options.spots)
     if onset.doubt:
-        warnings.append(f"{onset.doubt}: the start is known from the first motion alone; give valve_start_s")
-    return onset.time_s, onset.sd_s
+        known = "phase of the valves" if onset.moving else "start"
+        source_of_it = "cycle" if onset.moving else "first motion"
+        warnings.append(
+            f"{onset.doubt}: the {known} is known from the {source_of_it} alone; give valve_start_s"
+        )
+    return onset
+
+
+def _seen_gait(gait: Gait, time_s: Array, tracks: Array, warnings: list[str]) -> Gait:
+    """Return the gait at the frequency that the bends show, where it is not the one listed."""
+    if gait.frequency_hz <= 0:
+        return gait
+    moving = first_motion(tracks.reshape(len(tracks), -1), noise_sd(tracks)) or 0
+    # the bends' build-up after the start is not periodic
+    running = time_s > time_s[moving] + (SETTLED_S if moving > QUIET_FRAMES else 0.0)
+    seen = seen_frequency(time_s[running], tracks[running], gait.frequency_hz)
+    if seen is None and (far := far_frequency(time_s[running], tracks[running], gait.frequency_hz)):
+        warnings.append(f"the bends repeat at about {far:.3g} Hz; {gait.frequency_hz:g} Hz is listed: which?")
+    if seen is None or not seen.differs(gait.frequency_hz, float(np.ptp(time_s))):
+        return gait
+    words = (
+        f"the bends repeat at {seen.value_hz:.5g} Hz (sd {seen.sd_hz:.1g}), not at {gait.frequency_hz:g} Hz"
+    )
+    if gait.schedule is not None:
+        warnings.append(f"{words}: does the clock of the schedule run as the camera's?")
+        return gait
+    warnings.append(f"{words}: taken as seen")
+    return replace(gait, frequency_hz=float(f"{seen.value_hz:.7g}"))

@@ -20,18 +20,23 @@ CYCLES = 2.0
 # a fit that leaves more than this share of the shapes' change is not the motion that was asked for: from 0.2
 # a wrong phase lag passes, at 0.5 a robot whose segments differ is refused
 MOST_LEFT = 0.35
+DRIFT = 8.0  # standard deviations of chi squared; rest on a shaking table stays below
+PHASES = 24  # tried per cycle
+LEAST_RUN_IN_S, LEAST_RUN_IN_CYCLES = 1.5, 3  # after which a gait has forgotten how it began
 
 
 @dataclass(frozen=True)
 class Onset:
     """Start of the valves on the camera's clock; a dead time of the valves is part of it.
 
-    `doubt` says why the start is bracketed by the first motion; empty when the fit stands.
+    `doubt` says why the start is bracketed by the first motion; empty when the fit stands. `moving` tells
+    that the take begins in mid-gait: then the start is that of a run-in of whole cycles before the take.
     """
 
     time_s: float
     sd_s: float
     doubt: str = ""
+    moving: bool = False
 
 
 @dataclass(frozen=True)
@@ -103,29 +108,97 @@ def find_onset(
     Raises
     ------
     NoAnswerError
-        If the robot never moves, moves from the first frames on, or has no valve wave.
+        If the robot never moves or has no valve wave.
     """
-    from scipy.optimize import least_squares
-
     if not gait.frequency_hz > 0:
         raise NoAnswerError("without a valve wave the start cannot be found: give valve_start_s by hand")
-    moving = _first_motion(markers_m.reshape(len(markers_m), -1), noise_sd(markers_m))
+    moving = first_motion(markers_m.reshape(len(markers_m), -1), noise_sd(markers_m))
     if moving is None:
         raise NoAnswerError("the markers never move: give valve_start_s by hand")
     if moving < QUIET_FRAMES:
-        raise NoAnswerError("the take begins in motion: give valve_start_s by hand")
+        return find_phase(robot, gait, time_s, markers_m, spots)
+    if _drifts(markers_m.reshape(len(markers_m), -1)[: max(moving // 2, QUIET_FRAMES)], noise_sd(markers_m)):
+        running = find_phase(robot, gait, time_s, markers_m, spots)
+        if not running.doubt:
+            return running
     centre, settle = float(time_s[moving]), robot.tau1_s + robot.tau2_s
     window = (time_s > centre - 2 * settle) & (time_s < centre + CYCLES / gait.frequency_hz)
     time, points = time_s[window], markers_m[window]
-    z = points[..., 0] + 1j * points[..., 1]
+    low, high = max(centre - settle, float(time_s[0])), centre + float(np.median(np.diff(time_s)))
+    grid = np.linspace(low, centre, 25)
+    found = _fitted(robot, gait, time, points, chain_of(robot, spots), grid, (low, high))
+    bracket = float((high - low) / np.sqrt(12))
+    if found.left > MOST_LEFT or found.edge:
+        reason = (
+            found.complaint
+            if found.left > MOST_LEFT
+            else "the best start lies at the end of what the first motion allows"
+        )
+        return Onset((low + high) / 2, bracket, reason)
+    return Onset(found.start_s, min(found.sd_s, bracket))
+
+
+def run_in_s(frequency_hz: float) -> float:
+    """Return the time of whole cycles after which a gait has forgotten how it began."""
+    cycles = max(LEAST_RUN_IN_CYCLES, int(np.ceil(LEAST_RUN_IN_S * frequency_hz)))
+    return cycles / frequency_hz
+
+
+def find_phase(
+    robot: Robot, gait: Gait, time_s: Array, markers_m: Array, spots: Spots | None = None
+) -> Onset:
+    """Return when valves that ran in for whole cycles (`run_in_s`) started, for a take that begins in motion.
+
+    As `find_onset` fits the first cycles' shapes; every phase of the wave is tried.
+    """
+    period = 1 / gait.frequency_hz
+    first = float(time_s[0])
+    window = time_s < first + 2 * CYCLES * period
+    latest = first - run_in_s(gait.frequency_hz)
+    grid = latest - period * np.arange(PHASES) / PHASES
+    bounds = (latest - 1.5 * period, latest + 0.5 * period)
     chain = chain_of(robot, spots)
+    found = _fitted(robot, gait, time_s[window], markers_m[window], chain, grid, bounds)
+    start = latest - (latest - found.start_s) % period
+    bracket = float(period / np.sqrt(12))
+    if found.left > MOST_LEFT:
+        return Onset(start, bracket, found.complaint, moving=True)
+    return Onset(start, min(found.sd_s, bracket), moving=True)
+
+
+@dataclass(frozen=True)
+class _Fitted:
+    """Best start, its deviation, what is left of the shapes' change, whether it lies at a bound."""
+
+    start_s: float
+    sd_s: float
+    left: float
+    edge: bool
+
+    @property
+    def complaint(self) -> str:
+        return f"the bends seen are not those of the gait ({100 * self.left:.0f} % of them are left)"
+
+
+def _fitted(
+    robot: Robot,
+    gait: Gait,
+    time: Array,
+    points: Array,
+    chain: Chain,
+    grid: Array,
+    limits: tuple[float, float],
+) -> _Fitted:
+    """Fit start, C0 and time constants to the shapes, from the best starts of `grid`."""
+    from scipy.optimize import least_squares
+
+    z = points[..., 0] + 1j * points[..., 1]
 
     def gaps(p: Array) -> Array:
         kappa = p[1] * first_curvatures(robot, gait, time - p[0], p[2])
         return _shape_gaps(chain, kappa, z)
 
-    low, high = max(centre - settle, float(time_s[0])), centre + float(np.median(np.diff(time_s)))
-    grid = np.linspace(low, centre, 25)
+    low, high = limits
     costs = [float((gaps(np.array([start, 1.0, 1.0])) ** 2).sum()) for start in grid]
     bounds = ([low, 0.3, 0.3], [high, 3.0, 3.0])
     fits = [
@@ -135,18 +208,10 @@ def find_onset(
     fit = min(fits, key=lambda f: float(f.cost))
     still = _shape_gaps(chain, np.zeros((len(time), chain.links - 1)), z)
     left = float(np.sqrt(2 * fit.cost / max(float(still @ still), 1e-30)))
-    bracket = (high - low) / np.sqrt(12)
-    edge = min(fit.x[0] - low, high - fit.x[0]) < 1e-6
-    if left > MOST_LEFT or edge:
-        reason = (
-            f"the bends seen are not those of the gait ({100 * left:.0f} % of them are left)"
-            if left > MOST_LEFT
-            else "the best start lies at the end of what the first motion allows"
-        )
-        return Onset((low + high) / 2, float(bracket), reason)
     variance = 2 * fit.cost / max(len(fit.fun) - 3 * len(time) - 3, 1)
     covariance = np.linalg.pinv(fit.jac.T @ fit.jac) * variance * _correlated(fit.fun, len(time))
-    return Onset(float(fit.x[0]), float(min(np.sqrt(covariance[0, 0]), bracket)))
+    edge = bool(min(fit.x[0] - low, high - fit.x[0]) < 1e-6)
+    return _Fitted(float(fit.x[0]), float(np.sqrt(max(covariance[0, 0], 0.0))), left, edge)
 
 
 def _correlated(residual: Array, frames: int) -> float:
@@ -172,7 +237,18 @@ def _shape_gaps(chain: Chain, kappa: Array, z: NDArray[np.complex128]) -> Array:
     return np.concatenate([gap.real.ravel(), gap.imag.ravel()])
 
 
-def _first_motion(flat: Array, sd: float) -> int | None:
+def _drifts(flat: Array, sd: float) -> bool:
+    """Whether coordinates (T, n) that ought to be at rest show a trend beyond their noise."""
+    flat = flat[:, np.isfinite(flat).all(axis=0)]
+    if not flat.size:
+        return False
+    steps = np.arange(len(flat)) - (len(flat) - 1) / 2
+    slope = steps @ flat / (steps @ steps)
+    chi2 = float((slope**2).sum() * (steps @ steps)) / max(sd, 1e-9) ** 2
+    return chi2 > flat.shape[1] + DRIFT * np.sqrt(2 * flat.shape[1])
+
+
+def first_motion(flat: Array, sd: float) -> int | None:
     """Return the frame from which on the coordinates leave their rest (three frames in a row)."""
     import warnings
 

@@ -19,6 +19,7 @@ from srs_opt.measurement.records import (
     CENTRE_OF_MASS,
     KINDS,
     MARKER_ORDERS,
+    STARTS,
     TAIL_TO_HEAD,
     DataSet,
     Schedule,
@@ -39,7 +40,7 @@ TRIAL_COLUMNS = (
     "heading_rad",
     "duration_s",
 )
-OPTIONAL_TRIAL_COLUMNS = ("schedule", "tether", "floor", "replicate_of", "kind")
+OPTIONAL_TRIAL_COLUMNS = ("schedule", "tether", "floor", "replicate_of", "kind", "start")
 
 
 @dataclass(frozen=True)
@@ -223,6 +224,7 @@ def _read_trial(
         replicate_of=row.text("replicate_of") or None,
         kind=kind,
         spots=header.spots,
+        moving=row.word("start", STARTS, "rest", report) == "moving",
     )
     check_track(trial, track, header.robot, header.rate_hz, header.marker_sd_m, report)
     return trial

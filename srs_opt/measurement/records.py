@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 
 TAIL_TO_HEAD, CENTRE_OF_MASS = "tail_to_head", "centre_of_mass"
 MARKER_ORDERS = (TAIL_TO_HEAD, CENTRE_OF_MASS)
+STARTS = ("rest", "moving")
 KINDS = ("gait", "tow", "push", "step", "still")
 CONDITIONS = ("lifted", "ground")
 DIRECTIONS = ("tangential", "normal")
@@ -103,6 +104,9 @@ class Trial:
         What was done.
     spots : tuple of Spot or None
         Where the markers sit; None: one on every link's centre.
+    moving : bool
+        Whether the recording begins in mid-gait: then the valves started before the first label, long enough
+        for the start to be forgotten, and where the robot was and the clock's offset are to be fitted.
     """
 
     name: str
@@ -122,6 +126,7 @@ class Trial:
     replicate_of: str | None = None
     kind: str = "gait"
     spots: Spots | None = None
+    moving: bool = False
 
     @property
     def period_s(self) -> float:

@@ -138,7 +138,7 @@ def _check_clock(trial: Trial, track: Track, rate_hz: float, report: Report) -> 
     fine = True
     for row in np.flatnonzero(np.abs(steps - step) > 0.25 * step):
         fine = _report_step(float(steps[row]), step, file, lines[row + 1], report) and fine
-    if abs(time[0]) > 0.5 * step:
+    if abs(time[0]) > 0.5 * step and not trial.moving:
         report.warn(file, lines[0], f"the first sample is labelled {time[0]:g} s, expected 0")
     _check_duration(trial, float(time[-1] - time[0]) + step, step, file, lines[-1], report)
     return fine
@@ -201,7 +201,11 @@ def _check_start(trial: Trial, track: Track, chain: Chain, length_m: float, repo
     """The robot starts straight along heading_rad with its tail at the origin."""
     points = track.points_m
     tail, head = points[:10, 0], points[:10, -1]
-    if np.isnan(tail[:, 0]).all() or np.isnan(head[:, 0]).all() or trial.kind in ("tow", "push", "step"):
+    if (
+        np.isnan(tail[:, 0]).all()
+        or np.isnan(head[:, 0]).all()
+        or (trial.moving or trial.kind in ("tow", "push", "step"))
+    ):
         return
     start = np.nanmean(tail, axis=0)
     along = np.nanmean(head, axis=0) - start

@@ -1,0 +1,113 @@
+"""Trials that begin in mid-gait: where the robot was and the clock's offset are fitted to the track.
+
+The robot runs in, so that the start is forgotten; pose and offset are eliminated from the normal equations
+(variable projection), so that the fit's own coordinates do not know of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+ROUNDS = 8
+SETTLED_S = 1e-7
+DIFFERENCE_S = 1e-3  # for the velocity of the points; its error shrinks with the residual
+FREE = 4  # unknowns per trial
+
+
+@dataclass(frozen=True)
+class Alignment:
+    """How a predicted motion lies on the track.
+
+    Attributes
+    ----------
+    later_s : float
+        The sample labelled t shows the motion at t + later_s.
+    turn_rad : float
+        About the origin, before the shift.
+    shift_m : array (2,)
+    """
+
+    later_s: float
+    turn_rad: float
+    shift_m: np.ndarray
+
+    @property
+    def matrix(self) -> np.ndarray:
+        """Return the rotation (2, 2)."""
+        c, s = np.cos(self.turn_rad), np.sin(self.turn_rad)
+        return np.array([[c, -s], [s, c]])
+
+    def points(self, points: np.ndarray) -> np.ndarray:
+        """Return x1, y1, x2, ... (T, 2 M) where they lie."""
+        pairs = points.reshape(len(points), -1, 2)
+        return np.asarray(pairs @ self.matrix.T + self.shift_m).reshape(points.shape)
+
+    def slopes(self, slopes: np.ndarray) -> np.ndarray:
+        """Return derivatives of points, (T, 2 M, K), turned with them."""
+        frames, values, count = slopes.shape
+        pairs = slopes.reshape(frames, values // 2, 2, count)
+        return np.einsum("ij,tmjk->tmik", self.matrix, pairs).reshape(slopes.shape)
+
+    def pose(self, pose: np.ndarray) -> np.ndarray:
+        """Return poses (T, 3), moved alike."""
+        return np.column_stack([pose[:, :2] @ self.matrix.T + self.shift_m, pose[:, 2] + self.turn_rad])
+
+
+def align(
+    track: np.ndarray, predicted: Callable[[float], np.ndarray], most_s: float
+) -> tuple[Alignment, np.ndarray]:
+    """Return the best alignment, and the derivatives of the aligned points by its unknowns, (T, 2 M, 4).
+
+    Parameters
+    ----------
+    track : array (T, 2 M)
+        NaN where lost.
+    predicted : callable
+        Shift of the clock -> points (T, 2 M).
+    most_s : float
+        Limit of that shift, to either side.
+    """
+    seen = np.isfinite(track)
+    later = 0.0
+    for _ in range(ROUNDS):
+        points = predicted(later)
+        found = _rigid(track, points, later)
+        ends = [predicted(later + side * DIFFERENCE_S) for side in (1, -1)]
+        velocity = found.points(ends[0]) - found.points(ends[1])
+        placed = found.points(points)
+        by = np.stack([*_moves(placed), velocity / (2 * DIFFERENCE_S)], axis=2)
+        step = np.linalg.lstsq(by[seen], (track - placed)[seen], rcond=None)[0][-1]
+        moved = float(np.clip(later + step, -most_s, most_s))
+        if abs(moved - later) < SETTLED_S:
+            break
+        later = moved
+    return found, by
+
+
+def _moves(points: np.ndarray) -> list[np.ndarray]:
+    """Return the changes of points (T, 2 M) by shifts along x and y and a turn about the origin."""
+    pairs = points.reshape(len(points), -1, 2)
+    along = [np.broadcast_to(np.eye(2)[k], pairs.shape) for k in range(2)]
+    turned = np.stack([-pairs[..., 1], pairs[..., 0]], axis=-1)
+    return [move.reshape(points.shape) for move in (*along, turned)]
+
+
+def _rigid(track: np.ndarray, points: np.ndarray, later_s: float) -> Alignment:
+    """Return the turn and shift of least squares (Procrustes)."""
+    z, p = (np.ascontiguousarray(v).reshape(len(v), -1, 2) @ np.array([1, 1j]) for v in (track, points))
+    seen = np.isfinite(z)
+    z, p = z[seen], p[seen]
+    turn = float(np.angle(((z - z.mean()) * np.conj(p - p.mean())).sum()))
+    shift = z.mean() - np.exp(1j * turn) * p.mean()
+    return Alignment(later_s, turn, np.array([shift.real, shift.imag]))
+
+
+def without(columns: np.ndarray, free: np.ndarray, seen: np.ndarray) -> np.ndarray:
+    """Return columns (n, K) less what the free unknowns (n, 4) make of them where seen (n,)."""
+    basis = np.linalg.qr(free[seen] / np.linalg.norm(free[seen], axis=0))[0]
+    left = np.array(columns, dtype=float)
+    left[seen] -= basis @ (basis.T @ left[seen])
+    return left
