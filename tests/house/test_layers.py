@@ -21,6 +21,7 @@ LAYERS = (
     ("srs_opt.simulate.run", "srs_opt.simulate.figures", "srs_opt.simulate.export"),
     ("srs_opt.gait_opt", "srs_opt.gait_map"),
     ("srs_opt.gait_file", "srs_opt.controller"),
+    ("srs_opt.judge",),
     ("srs_opt.measurement",),
     ("srs_opt.drive",),
     ("srs_opt.calibrate",),
@@ -132,7 +133,7 @@ def test_no_circular_imports():
 
 
 @pytest.mark.parametrize(
-    "folder", ["srs_opt", "planners", "virtual_lab", "tests", "examples", "benchmarks", "docs"]
+    "folder", ["srs_opt", "planners", "dart_snake", "virtual_lab", "tests", "examples", "benchmarks", "docs"]
 )
 def test_files_can_be_read_in_a_sitting(folder):
     lengths = {
@@ -146,7 +147,7 @@ def test_nothing_knows_the_machine():
     """No file of the project names a place that exists on one machine only."""
     places = ("/root/", "/home/", "/work/", "/Users/", "/opt/", "/.library", "/shared/")
     told = []
-    for folder in ("srs_opt", "planners", "virtual_lab", "examples", "docs", "benchmarks"):
+    for folder in ("srs_opt", "planners", "dart_snake", "virtual_lab", "examples", "docs", "benchmarks"):
         for path in (ROOT / folder).rglob("*"):
             if path.suffix in (".py", ".md", ".yaml", ".json", ".html", ".jinja", ".c", ".h"):
                 text = path.read_text(encoding="utf-8")

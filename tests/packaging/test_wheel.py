@@ -35,7 +35,7 @@ def source(tmp_path_factory) -> Path:
     copy = tmp_path_factory.mktemp("source")
     for name in ("pyproject.toml", "README.md", "LICENSE"):
         shutil.copy(ROOT / name, copy)
-    for package in ("srs_opt", "planners"):
+    for package in ("srs_opt", "planners", "dart_snake"):
         shutil.copytree(ROOT / package, copy / package, ignore=shutil.ignore_patterns("__pycache__"))
     return copy
 
@@ -54,7 +54,7 @@ def built(source, tmp_path_factory) -> tuple[Path, Path]:
 def package_files(source: Path, suffixes: set[str]) -> set[str]:
     return {
         path.relative_to(source).as_posix()
-        for package in ("srs_opt", "planners")
+        for package in ("srs_opt", "planners", "dart_snake")
         for path in (source / package).rglob("*")
         if path.suffix in suffixes and path.is_file()
     }

@@ -1,0 +1,129 @@
+"""``python -m srs_opt.judge``: what another physics engine says of gaits and drives."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from typing import TYPE_CHECKING
+
+from srs_opt.command import (
+    Answer,
+    Parser,
+    chosen_model,
+    make_parser,
+    positive_float,
+    positive_int,
+    run_command,
+)
+
+if TYPE_CHECKING:
+    from srs_opt.judge.opinion import Opinion, Tolerance
+    from srs_opt.robot import Robot
+
+SHOWN = 30  # rows of the printed table
+
+
+def build_parser() -> Parser:
+    """Return the command's options."""
+    parser = make_parser(
+        "python -m srs_opt.judge",
+        "Play a gait, all gaits of a table, or a plan in another physics engine (DART: rolling wheels,\n"
+        "exact Coulomb contact) and say whether it agrees with us. Needs the extra 'judge'.\n"
+        "Lengths in m, times in s, angles in rad. Exit status 1: it does not agree.",
+        "python -m srs_opt.judge out/gait_opt/gait.json",
+        sweep=True,
+    )
+    add = parser.add_argument
+    add(
+        "file",
+        metavar="FILE",
+        help="gait.json, gait_table.json (all), gait_table.json:NAME, schedule .csv, plan.json, motion.json",
+    )
+    add("--pressure", type=positive_float, default=55.0, metavar="KPA", help="for a schedule (default 55)")
+    add("--step", type=positive_float, default=1e-3, metavar="S", help="the engine's step (default 0.001)")
+    add(
+        "--refine",
+        type=positive_int,
+        default=3,
+        metavar="N",
+        help="gaits of a table, drawn by --seed, that are played at half the step and with twice the hinges "
+        "too (default 3); a single gait always is",
+    )
+    add(
+        "--tolerance",
+        type=positive_float,
+        default=0.02,
+        metavar="SHARE",
+        help="of speed, up to which it agrees, or 2 mm/s; turn rates half as much again, or 0.02 rad/s "
+        "(default 0.02)",
+    )
+    return parser
+
+
+def run(options: argparse.Namespace) -> Answer:
+    """Read, play, compare."""
+    from srs_opt.judge.bodies import check_engine, check_robot
+    from srs_opt.judge.opinion import Tolerance
+    from srs_opt.robot import load_robot
+
+    check_engine()
+    robot = load_robot(options.robot)
+    check_robot(robot)
+    tolerance = Tolerance(options.tolerance, 1.5 * options.tolerance)
+    return _gaits(options, robot, tolerance)
+
+
+def _gaits(options: argparse.Namespace, robot: Robot, tolerance: Tolerance) -> Answer:
+    import shutil
+    import time
+
+    from srs_opt.files import write_json
+    from srs_opt.judge.cases import cases_of
+    from srs_opt.judge.figures import draw_opinions
+    from srs_opt.judge.gaits import Settings
+    from srs_opt.judge.opinion import opinions
+    from srs_opt.sweep import Resume
+
+    model, settings = chosen_model(options, robot), Settings(options.step)
+    cases = cases_of(options.file, robot, options.pressure, options.refine, options.seed)
+    unfinished = options.out / "judge.unfinished"  # an interrupted run goes on from here
+    begun = time.perf_counter()
+    found = opinions(
+        robot, cases, model, settings, tolerance, jobs=options.jobs, cluster=options.cluster,
+        quiet=options.quiet, resume=Resume(unfinished, f"judge {robot.fingerprint()} {model} {settings}"),
+    )  # fmt: skip
+    shutil.rmtree(unfinished, ignore_errors=True)
+    answer = {
+        "gaits": [opinion.to_record() for opinion in found],
+        "agree": sum(opinion.agrees for opinion in found),
+        "tolerance": tolerance.to_record(),
+        "robot": robot.name,
+        "model": model,
+        "seconds": round(time.perf_counter() - begun, 3),
+    }
+    files = [
+        write_json(options.out / "judge.json", answer),
+        *draw_opinions(found, options.out / "judge"),
+    ]
+    return Answer(answer, _table(found), all(opinion.agrees for opinion in found), tuple(files))
+
+
+def _table(found: list[Opinion]) -> str:
+    """Return the opinions as lines; of many, those that disagree and the first."""
+    shown = sorted(found, key=lambda o: o.agrees)[:SHOWN] if len(found) > SHOWN else found
+    width = max(len(o.name) for o in shown)
+    lines = [f"{o.name:{width}s}  {o.in_words()}" for o in shown]
+    if len(found) > len(shown):
+        lines.append(f"… and {len(found) - len(shown)} more that agree")
+    if len(found) > 1:
+        lines.append(f"{sum(o.agrees for o in found)} of {len(found)} gaits agree")
+    return "\n".join(lines)
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the command."""
+    return run_command(build_parser(), run, argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,64 @@
+"""Picture of opinions: the engine's speeds and turn rates over ours, and the differences."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from srs_opt.figures import COLOURS, PAGE_IN, new_figure, save_figure, styled
+from srs_opt.judge.opinion import Opinion
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+@styled
+def draw_opinions(found: Sequence[Opinion], stem: Path) -> tuple[Path, Path]:
+    """Draw differences over our values, with the tolerance as a band; return the files."""
+    figure, (speed, turn) = new_figure(1, 2, width_in=PAGE_IN, height_in=2.8)
+    known = [o for o in found if o.ours.speed_m_s is not None]
+    agrees = np.array([o.agrees for o in known], dtype=bool)
+    t = found[0].tolerance
+    _panel(
+        speed,
+        np.array([o.ours.speed_m_s for o in known], dtype=float),
+        np.array([o.judge.speed_m_s for o in known]),
+        agrees,
+        (t.speed_share, t.speed_m_s),
+        1e3,
+    )
+    speed.set_xlabel("our speed (m/s)")
+    speed.set_ylabel("the engine's less ours (mm/s)")
+    _panel(
+        turn,
+        np.array([o.ours.turn_rate_rad_s for o in known], dtype=float),
+        np.array([o.judge.turn_rate_rad_s for o in known]),
+        agrees,
+        (t.turn_share, t.turn_rate_rad_s),
+        1.0,
+    )
+    turn.set_xlabel("our turn rate (rad/s)")
+    turn.set_ylabel("the engine's less ours (rad/s)")
+    figure.suptitle(f"{int(agrees.sum())} of {len(found)} gaits agree (band: tolerance)", fontsize=9)
+    return save_figure(figure, stem)
+
+
+def _panel(
+    axes: Axes,
+    ours: np.ndarray,
+    theirs: np.ndarray,
+    agrees: np.ndarray,
+    tolerance: tuple[float, float],
+    scale: float,
+) -> None:
+    share, least = tolerance
+    reach = 1.1 * max(np.abs(ours).max(initial=0.0), 2 * least / share)
+    along = np.linspace(-reach, reach, 401) if (ours < 0).any() else np.linspace(0.0, reach, 401)
+    band = scale * np.maximum(share * np.abs(along), least)
+    axes.fill_between(along, -band, band, color=COLOURS[7], alpha=0.25, linewidth=0)
+    axes.axhline(0.0, color=COLOURS[6], linewidth=0.6)
+    for mask, colour, marker in ((agrees, COLOURS[0], "o"), (~agrees, COLOURS[1], "x")):
+        axes.plot(ours[mask], scale * (theirs - ours)[mask], marker, color=colour, markersize=3.5)

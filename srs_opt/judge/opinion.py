@@ -1,0 +1,164 @@
+"""Our motion of a gait beside the engine's, and whether the two agree."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from srs_opt.errors import InputError, NoAnswerError
+from srs_opt.gait import Gait
+from srs_opt.judge.gaits import DEFAULT_SETTINGS, Judged, Settings, judge_gait
+from srs_opt.orbit.steady import steady_gait
+from srs_opt.robot import Robot
+from srs_opt.sweep import Resume, sweep
+
+# Agreement: contact solvers and step sizes leave a few parts in a thousand, another friction law 40 %.
+SPEED_SHARE, SPEED_M_S = 0.02, 0.002
+# A straight gait has no turn rate to take a share of: 2 mm/s at 0.1 m from the middle of the body.
+TURN_SHARE, TURN_RAD_S = 0.03, 0.02
+SHARP_M_S = 3e-4  # our friction is smoothed over no more than this: theirs is not smoothed at all
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """Up to which differences two motions agree: a share of ours, or that much where it is more."""
+
+    speed_share: float = SPEED_SHARE
+    turn_share: float = TURN_SHARE
+    speed_m_s: float = SPEED_M_S
+    turn_rate_rad_s: float = TURN_RAD_S
+
+    def to_record(self) -> dict[str, float]:
+        """Return the JSON object."""
+        return dict(vars(self))
+
+
+DEFAULT_TOLERANCE = Tolerance()
+
+
+@dataclass(frozen=True)
+class Ours:
+    """Our steady motion, None throughout where the model finds none."""
+
+    speed_m_s: float | None
+    turn_rate_rad_s: float | None
+    radius_m: float | None
+
+
+@dataclass(frozen=True)
+class Opinion:
+    """What both say of one gait."""
+
+    name: str
+    ours: Ours
+    judge: Judged
+    tolerance: Tolerance
+
+    @property
+    def agrees(self) -> bool:
+        """Whether speed and turn rate are within tolerance."""
+        if self.ours.speed_m_s is None or self.ours.turn_rate_rad_s is None:
+            return False
+        t = self.tolerance
+        speed, turn = self.ours.speed_m_s, self.ours.turn_rate_rad_s
+        speed_ok = abs(self.judge.speed_m_s - speed) <= max(t.speed_share * abs(speed), t.speed_m_s)
+        turn_ok = abs(self.judge.turn_rate_rad_s - turn) <= max(t.turn_share * abs(turn), t.turn_rate_rad_s)
+        return speed_ok and turn_ok
+
+    def to_record(self) -> dict[str, Any]:
+        """Return the JSON object."""
+        known = self.ours.speed_m_s is not None and self.ours.turn_rate_rad_s is not None
+        return {
+            "name": self.name,
+            "ours": dict(vars(self.ours)),
+            "judge": self.judge.to_record(),
+            "difference": {
+                "speed_m_s": self.judge.speed_m_s - self.ours.speed_m_s if known else None,  # type: ignore[operator]
+                "turn_rate_rad_s": self.judge.turn_rate_rad_s - self.ours.turn_rate_rad_s if known else None,  # type: ignore[operator]
+            },
+            "agrees": self.agrees,
+        }
+
+    def in_words(self) -> str:
+        """Return the opinion on one gait in a line."""
+        them, us = self.judge, self.ours
+        word = "agrees" if self.agrees else "DISAGREES"
+        error = "" if them.speed_error_m_s is None else f" ± {them.speed_error_m_s:.4f}"
+        mine = "none" if us.speed_m_s is None else f"{us.speed_m_s:.4f} m/s, {us.turn_rate_rad_s:+.3f} rad/s"
+        return f"{word}: {them.speed_m_s:.4f}{error} m/s, {them.turn_rate_rad_s:+.3f} rad/s; ours {mine}"
+
+
+def ours_of(robot: Robot, gait: Gait, model: str | None) -> Ours:
+    """Return our steady motion with friction at least as sharp as `SHARP_M_S`."""
+    sharp = robot.with_values(friction_speed_m_s=min(robot.friction_speed_m_s, SHARP_M_S))
+    try:
+        orbit = steady_gait(sharp, gait, model)
+    except NoAnswerError:
+        return Ours(None, None, None)
+    return Ours(orbit.speed_m_s, orbit.turn_rate_rad_s, orbit.radius_m)
+
+
+def opinion_on(
+    robot: Robot,
+    name: str,
+    gait: Gait,
+    model: str | None = None,
+    settings: Settings = DEFAULT_SETTINGS,
+    tolerance: Tolerance = DEFAULT_TOLERANCE,
+    *,
+    refine: bool = True,
+) -> Opinion:
+    """Return both motions of one gait.
+
+    Raises
+    ------
+    InputError
+        If gait and robot do not belong together, or the engine cannot stand for the robot.
+    """
+    if gait.segments != robot.segments:
+        raise InputError(f"gait drives {gait.segments} segments, robot '{robot.name}' has {robot.segments}")
+    judged = judge_gait(robot, gait, settings, refine=refine)
+    return Opinion(name, ours_of(robot, gait, model), judged, tolerance)
+
+
+@dataclass(frozen=True)
+class Case:
+    """A gait to be judged."""
+
+    name: str
+    gait: Gait
+    refine: bool
+
+
+def opinions(
+    robot: Robot,
+    cases: Sequence[Case],
+    model: str | None = None,
+    settings: Settings = DEFAULT_SETTINGS,
+    tolerance: Tolerance = DEFAULT_TOLERANCE,
+    *,
+    jobs: int = 1,
+    cluster: str | None = None,
+    quiet: bool = True,
+    resume: Resume | None = None,
+) -> list[Opinion]:
+    """Return the opinions on many gaits, in order."""
+    work = partial(_chunk, robot, model, settings)
+    rows = sweep(
+        work, list(cases), chunk=1, jobs=jobs, cluster=cluster, what="judging", quiet=quiet, resume=resume
+    )
+    return [
+        Opinion(case.name, Ours(*ours), Judged(**judged), tolerance)
+        for case, (ours, judged) in zip(cases, rows)
+    ]
+
+
+def _chunk(robot: Robot, model: str | None, settings: Settings, cases: Sequence[Case]) -> list[Any]:
+    """Return the opinions on some gaits as JSON holds them."""
+    found = []
+    for case in cases:
+        opinion = opinion_on(robot, case.name, case.gait, model, settings, refine=case.refine)
+        found.append([list(vars(opinion.ours).values()), dict(vars(opinion.judge))])
+    return found
