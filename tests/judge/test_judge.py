@@ -42,7 +42,8 @@ def test_a_turning_gait_backwards():
 def test_soft_silicone():
     """0.246 m/s there (0.231 when stiff), three hinges per segment in this engine within 2.5 % of it."""
     soft = ROBOT.with_values(bending_stiffness_n_m2=0.005, bending_relaxation_s=0.005)
-    assert judge_gait(soft, published_wave(ROBOT).gait(), Settings(2e-3)).speed_m_s == pytest.approx(0.246, rel=0.025)
+    them = judge_gait(soft, published_wave(ROBOT).gait(), Settings(2e-3))
+    assert them.speed_m_s == pytest.approx(0.246, rel=0.025)
 
 
 def laboratory(robot: Robot, effects: list[dict], offset: float) -> tuple[float, float]:
@@ -107,6 +108,8 @@ def test_a_table_through_the_command(tmp_path, capsys):
         "1",
         "--step",
         "0.004",
+        "--tolerance",
+        "0.03",
         "--out",
         str(tmp_path),
     ]
