@@ -82,7 +82,7 @@ def _gaits(options: argparse.Namespace, robot: Robot, tolerance: Tolerance) -> A
     from srs_opt.judge.figures import draw_opinions
     from srs_opt.judge.gaits import Settings
     from srs_opt.judge.opinion import opinions
-    from srs_opt.sweep import Resume
+    from srs_opt.parallel.sweep import Resume
 
     model, settings = chosen_model(options, robot), Settings(options.step)
     cases = cases_of(options.file, robot, options.pressure, options.refine, options.seed)

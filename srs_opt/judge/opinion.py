@@ -11,8 +11,9 @@ from srs_opt.errors import InputError, NoAnswerError
 from srs_opt.gait import Gait
 from srs_opt.judge.gaits import DEFAULT_SETTINGS, Judged, Settings, judge_gait
 from srs_opt.orbit.steady import steady_gait
+from srs_opt.parallel import executor
+from srs_opt.parallel.sweep import Resume, sweep
 from srs_opt.robot import Robot
-from srs_opt.sweep import Resume, sweep
 
 # Agreement: contact solvers and step sizes leave a few parts in a thousand, another friction law 40 %.
 SPEED_SHARE, SPEED_M_S = 0.02, 0.002
@@ -146,9 +147,10 @@ def opinions(
 ) -> list[Opinion]:
     """Return the opinions on many gaits, in order."""
     work = partial(_chunk, robot, model, settings)
-    rows = sweep(
-        work, list(cases), chunk=1, jobs=jobs, cluster=cluster, what="judging", quiet=quiet, resume=resume
-    )
+    with executor(jobs, cluster) as where:
+        rows = list(
+            sweep(work, list(cases), chunk=1, where=where, what="judging", quiet=quiet, resume=resume)
+        )
     return [
         Opinion(case.name, Ours(*ours), Judged(**judged), tolerance)
         for case, (ours, judged) in zip(cases, rows)
