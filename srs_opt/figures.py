@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import base64
+import io
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -108,3 +111,19 @@ def fill_region(axes: Axes, region: Any, **style: Any) -> None:
     axes.add_patch(PathPatch(Outline.make_compound_path(*rings), **{"linewidth": 0, **style}))
     axes.update_datalim([region.bounds[:2], region.bounds[2:]])
     axes.autoscale_view()
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture of a page, as PNG in base64, with its words."""
+
+    title: str
+    caption: str
+    png: str
+
+
+def encoded(figure: Figure, title: str, caption: str) -> Picture:
+    """Return a figure as a picture of a page that needs no other file."""
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", metadata={"Software": None})
+    return Picture(title, caption, base64.b64encode(stream.getvalue()).decode("ascii"))

@@ -18,8 +18,8 @@ from srs_opt.command import (
 
 if TYPE_CHECKING:
     from planners.maze.maze import Maze
-    from srs_opt.discrepancy.pictures import Picture
     from srs_opt.discrepancy.pipeline import Discrepancy
+    from srs_opt.figures import Picture
     from srs_opt.robot import Robot
 
 
@@ -127,7 +127,7 @@ def _payoff(
 ) -> tuple[dict[str, Any] | None, str, list[Picture]]:
     """Return what the name changes: for the record, in words, and as pictures."""
     from srs_opt.discrepancy.payoff import payoff
-    from srs_opt.discrepancy.pictures import encoded
+    from srs_opt.figures import encoded
 
     def tell(message: str) -> None:
         say(options, message)

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import io
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,21 +9,12 @@ import numpy as np
 from srs_opt.discrepancy.locate import misfit_by_trial
 from srs_opt.discrepancy.pipeline import Discrepancy
 from srs_opt.discrepancy.seal import sealed_residuals
-from srs_opt.figures import COLOURS, PAGE_IN, styled
+from srs_opt.figures import COLOURS, PAGE_IN, Picture, encoded, styled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 AFTER, BEFORE = COLOURS[:2]
-
-
-@dataclass(frozen=True)
-class Picture:
-    """One picture with its words."""
-
-    title: str
-    caption: str
-    png: str
 
 
 @styled
@@ -45,13 +33,6 @@ def _figure(width: float, height: float) -> Figure:
 
     figure = Figure(figsize=(width, height), dpi=150, layout="constrained")
     return figure
-
-
-def encoded(figure: Figure, title: str, caption: str) -> Picture:
-    """Return a figure as a picture of the report."""
-    stream = io.BytesIO()
-    figure.savefig(stream, format="png", metadata={"Software": None})
-    return Picture(title, caption, base64.b64encode(stream.getvalue()).decode("ascii"))
 
 
 def _sealed(found: Discrepancy) -> Picture:

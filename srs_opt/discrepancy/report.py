@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from srs_opt.discrepancy.examined import Examined
-from srs_opt.discrepancy.pictures import Picture, pictures
+from srs_opt.discrepancy.pictures import pictures
 from srs_opt.discrepancy.pipeline import Discrepancy
 from srs_opt.discrepancy.verdict import NAMED, NAMED_IN_PART, NO_GAP, NOT_TESTABLE, ONE_OF, UNKNOWN
+from srs_opt.figures import Picture
 from srs_opt.files import write_text
 from srs_opt.model.effects import all_effects
 

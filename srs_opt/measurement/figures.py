@@ -77,7 +77,7 @@ def track_figure(trial: Trial, every_s: float = 0.5) -> Figure:
     if trial.markers_m is not None:
         for number in range(trial.markers_m.shape[1]):
             axes.plot(*trial.markers_m[:, number].T, linewidth=0.5, color="0.7")
-        for moment in np.arange(0.0, float(trial.time_s[-1]), every_s):
+        for moment in np.arange(float(trial.time_s[0]), float(trial.time_s[-1]), every_s):
             frame = trial.markers_m[int(np.argmin(np.abs(trial.time_s - moment)))]
             seen = frame[np.isfinite(frame[:, 0])]
             axes.plot(*seen.T, "-", color=FIT, linewidth=1)

@@ -25,7 +25,7 @@ LAYERS = (
     ("srs_opt.measurement",),
     ("srs_opt.drive",),
     ("srs_opt.calibrate",),
-    ("srs_opt.discrepancy",),
+    ("srs_opt.discrepancy", "srs_opt.report"),
     ("planners.maze", "planners.motion"),
     ("planners.search",),
     ("planners.generate",),

@@ -137,6 +137,8 @@ CASES = [
     ("srs_opt.gait_opt", ["--min-dwell", "3"], 2, "--min-dwell"),
     ("srs_opt.gait_opt", ["--warm", "{tmp}/gait.json"], 2, "missing"),
     ("srs_opt.gait_opt", ["--robots", "{tmp}/absent.yaml"], 2, "no such file"),
+    ("srs_opt.report", ["{tmp}/absent"], 2, "absent"),
+    ("srs_opt.report", ["{tmp}/set"], 2, "dataset.yaml"),
     ("srs_opt.calibrate", ["{tmp}/absent"], 2, "absent"),
     ("srs_opt.calibrate", ["{tmp}/set"], 2, "dataset.yaml"),
     ("srs_opt.discrepancy", ["{tmp}/absent"], 2, "absent"),

@@ -1,0 +1,1 @@
+"""One page per data set: what was seen, trial by trial."""
