@@ -20,9 +20,9 @@ from planners.maze.places import RobotSize
 from planners.motion.store import load_motion
 from planners.motion.table import MotionTable
 from planners.plan.certify import certify
-from planners.plan.portfolio import HALVINGS, ompl_gaits
+from planners.plan.portfolio import found_apart
+from planners.plan.registry import planner_named
 from planners.plan.solve import LatticeSolver
-from planners.search.lattice import LatticeSettings
 from planners.search.problem import Problem
 from srs_opt.gait_opt.catalogue import default_table
 from srs_opt.gait_opt.table import GaitTable
@@ -56,7 +56,7 @@ def attempt(ratio: float, planner: str, seed: int) -> Row:
     if planner == "ours":
         solved = _ours(problem)
     else:
-        way = ompl_gaits(problem, planner, ITERATIONS, seed)
+        way = found_apart(problem, planner, ITERATIONS, seed)
         solved = way is not None and certify(problem, way).passed
     return {
         "ratio": ratio,
@@ -71,8 +71,9 @@ def _ours(problem: Problem) -> bool:
     first = LatticeSolver(problem, time_limit_s=LIMIT_S).run(NODES)
     if first.plan is not None or first.status == "infeasible":
         return first.plan is not None
-    fine = LatticeSolver(problem, LatticeSettings(most_halvings=HALVINGS), beams=(), time_limit_s=LIMIT_S)
-    return fine.run(NODES).plan is not None
+    make = planner_named("fine").solver
+    assert make is not None  # it is one of ours
+    return make(problem, time_limit_s=LIMIT_S).run(NODES).plan is not None
 
 
 def section(rows: list[Row], when: str) -> Section:

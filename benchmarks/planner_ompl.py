@@ -8,20 +8,14 @@ certified plan.
 
 from __future__ import annotations
 
-import contextlib
-import io
 import random
-import sqlite3
-import tempfile
-from multiprocessing import get_context
-from multiprocessing.connection import Connection
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from benchmarks.planner_narrow import MARGIN_M, attempt, setting
 from benchmarks.section import Section
+from planners.benchmark.runs import in_own_process, recorded
 from planners.generate.areas import corridor
 from planners.maze.places import RobotSize
 from planners.plan.certify import certify
@@ -31,10 +25,6 @@ from planners.search.ompl_setup import seeded
 from planners.search.problem import Problem
 
 METHODS = ("RRTConnect", "BITstar", "RRT", "KPIECE1", "RRTstar")
-QUERY = (
-    "select c.name, r.time, r.solved, r.correct_solution "
-    "from runs r join plannerConfigs c on c.id = r.plannerid order by r.id"
-)
 Run = tuple[str, float, bool, bool, bool]  # planner, s, exact, its path checks, certified
 
 
@@ -68,7 +58,8 @@ def ompl_runs(ratio: float, count: int, limit_s: float) -> list[Run]:
         simplify=False,
     )
     benchmark.benchmark(request)
-    return [(*run, passed) for run, passed in zip(_recorded(benchmark), certified)]
+    _, runs = recorded(benchmark)
+    return [(name.removeprefix("k"), *run, passed) for (name, *run), passed in zip(runs, certified)]
 
 
 def _certified(problem: Problem, planner: Any) -> bool:
@@ -79,42 +70,6 @@ def _certified(problem: Problem, planner: Any) -> bool:
     path = poses_along(definition.getSolutionPath())
     way = None if path is None else follow(problem, reference_along(problem, path))
     return way is not None and certify(problem, tuple(step.gait for step in way)).passed
-
-
-def _recorded(benchmark: Any) -> list[tuple[str, float, bool, bool]]:
-    """Return the runs without our verdict, read from the log as OMPL's own tools read it."""
-    from ompl import tools
-
-    with tempfile.TemporaryDirectory() as scratch:
-        log, rows = Path(scratch) / "runs.log", Path(scratch) / "runs.db"
-        benchmark.saveResultsToFile(str(log))
-        with contextlib.redirect_stdout(io.StringIO()):  # it tells what it parses
-            tools.readBenchmarkLog(str(rows), [str(log)], False)
-        with contextlib.closing(sqlite3.connect(rows)) as base:
-            return [
-                (name.removeprefix("geometric_").removeprefix("k"), time, bool(exact), bool(right))
-                for name, time, exact, right in base.execute(QUERY)
-            ]
-
-
-def alone(ratio: float, count: int, limit_s: float) -> list[Run]:
-    """Return `ompl_runs` from a process of its own: OMPL's planners may take it down."""
-    context = get_context("spawn")
-    receiver, sender = context.Pipe(duplex=False)
-    process = context.Process(target=_send, args=(sender, ratio, count, limit_s))
-    process.start()
-    sender.close()
-    try:
-        return list(receiver.recv())
-    except EOFError:
-        raise RuntimeError(f"OMPL took its process down at a width of {ratio:g}") from None
-    finally:
-        process.terminate()  # an orderly end would list what OMPL's bindings forget to free
-        process.join()
-
-
-def _send(sender: Connection, ratio: float, count: int, limit_s: float) -> None:
-    sender.send(ompl_runs(ratio, count, limit_s))
 
 
 def _told(runs: list[Run]) -> str:
@@ -129,7 +84,7 @@ def run(quick: bool) -> Section:
     ratios, count, limit_s = ((2.0,), 1, 0.5) if quick else ((1.15, 1.3, 1.6, 2.0), 5, 2.0)
     rows = []
     for ratio in ratios:
-        runs = alone(ratio, count, limit_s)
+        runs = in_own_process(ompl_runs, ratio, count, limit_s, what=f"width {ratio:g}")
         ours = attempt(ratio, "ours", 0)
         mine = f"{'certified' if ours['solved'] else 'none'} ({ours['cpu_s']:.2f} s)"
         told = [_told([run for run in runs if run[0] == method]) for method in METHODS]

@@ -83,7 +83,8 @@ def make_parser(
         action="append",
         default=[],
         metavar="FILE.py",
-        help="Python file that defines effects or objectives of your own; it is run (repeat for several)",
+        help="Python file that defines effects, objectives or planners of your own; it is run (repeat "
+        "for several)",
     )
     parser.add_argument("--quiet", action="store_true", help="no progress, no messages")
     parser.add_argument(

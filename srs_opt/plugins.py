@@ -1,8 +1,8 @@
 """Plugins: files that the command line names with --plugin, and entry points of installed packages.
 
 A plugin registers what it defines when it is run (`srs_opt.model.effects.register_effect`,
-`srs_opt.gait_opt.objectives.registry.register_objective`). A robot file may say which plugins it needs;
-loading it never runs one.
+`srs_opt.gait_opt.objectives.registry.register_objective`, `planners.plan.registry.register_planner`). A
+robot file may say which plugins it needs; loading it never runs one.
 """
 
 from __future__ import annotations
@@ -77,6 +77,11 @@ def running() -> str | None:
 def loaded() -> tuple[str, ...]:
     """Return the names of the plugin files that were run."""
     return tuple(_loaded)
+
+
+def files() -> tuple[Path, ...]:
+    """Return the plugin files that were run, for other processes to run them too."""
+    return tuple(_loaded.values())
 
 
 def entry_points(group: str) -> Iterator[tuple[str, Any]]:

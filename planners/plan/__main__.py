@@ -14,10 +14,6 @@ if TYPE_CHECKING:
     from planners.search.problem import Problem
     from srs_opt.robot import Robot
 
-PLANNERS = (
-    *("auto", "lattice", "rrt", "est", "kpiece"),
-    *("dubins-bitstar", "dubins-rrtconnect", "rs-bitstar", "rs-rrtconnect"),
-)
 COSTS = ("time", "length", "clearance", "air")
 MARGIN_M = 0.005
 
@@ -45,16 +41,32 @@ def build_parser() -> Parser:
 
 def add_planning_options(parser: Parser) -> None:
     """Add the maze, and everything that decides how the way through it is planned."""
-    from planners.plan.options import goal_option, pose_option
-
     parser.add_argument(
         "maze", metavar="MAZE", help="our YAML, ROS map YAML, MovingAI, micromouse, BARN .world"
     )
+    add_problem_options(parser)
     parser.add_argument(
-        "--gaits", type=Path, metavar="FILE", help="gait table (default: the one built for this robot)"
+        "--planner",
+        type=str.lower,
+        default="auto",
+        metavar="NAME",
+        help="auto (default, a portfolio), lattice, fine, one of OMPL's (rrt, est, kpiece1; dubins-NAME and "
+        "rs-NAME for a route of its geometric planners), or one that a --plugin registers",
     )
     parser.add_argument(
-        "--planner", type=str.lower, choices=PLANNERS, default="auto", help="default auto: a portfolio"
+        "--best", action="store_true", help="go on looking for better plans until the time limit"
+    )
+    parser.add_argument(
+        "--time-limit", type=positive_float, default=60.0, metavar="S", help="guard, s (default %(default)g)"
+    )
+
+
+def add_problem_options(parser: Parser) -> None:
+    """Add everything but the maze that decides what has to be planned."""
+    from planners.plan.options import goal_option, pose_option
+
+    parser.add_argument(
+        "--gaits", type=Path, metavar="FILE", help="gait table (default: the one built for this robot)"
     )
     parser.add_argument("--start", type=pose_option, metavar="X,Y,HEADING", help="in place of the maze's")
     parser.add_argument("--goal", type=goal_option, metavar="X,Y[,RADIUS]", help="in place of the maze's")
@@ -108,12 +120,6 @@ def add_planning_options(parser: Parser) -> None:
     parser.add_argument(
         "--cost", choices=COSTS, default="time", help="what the plan shall have little of (default time)"
     )
-    parser.add_argument(
-        "--best", action="store_true", help="go on looking for better plans until the time limit"
-    )
-    parser.add_argument(
-        "--time-limit", type=positive_float, default=60.0, metavar="S", help="guard, s (default %(default)g)"
-    )
 
 
 def run(options: argparse.Namespace) -> Answer:
@@ -121,12 +127,15 @@ def run(options: argparse.Namespace) -> Answer:
     from planners.plan.inputs import problem_from
     from planners.plan.looks import looks
     from planners.plan.portfolio import Wish, solve
+    from planners.plan.registry import planner_named
     from planners.view.animation_path import check_animation_path
     from srs_opt.files import write_json
     from srs_opt.robot import load_robot
 
     if options.animate:
         check_animation_path(options.animate)  # before any work
+    if options.planner != "auto":
+        planner_named(options.planner)
     true_robot = load_robot(options.true_robot) if options.true_robot else None
     problem = problem_from(options)
     wish = Wish(options.planner, options.seed, options.time_limit, options.best)

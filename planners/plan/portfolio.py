@@ -1,8 +1,8 @@
 """Which planner answers: one by name, or the portfolio.
 
-The portfolio goes in rounds of counted work. In a round the lattice search looks first, in this process;
-only when it has found nothing do OMPL's planners get their iterations, each in a process of its own. The
-first round with a certified plan ends it, and within a round the order of PLANNERS decides, not the
+The portfolio goes in rounds of counted work. In a round our own searches look first, in this process; only
+when they have found nothing do OMPL's planners get their iterations, each in a process of its own. The
+first round with a certified plan ends it, and within a round the order of the registry decides, not the
 clock: the same seed gives the same plan. The time limit is a guard.
 """
 
@@ -15,21 +15,20 @@ from concurrent.futures import TimeoutError as LateError  # the built-in one onl
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from multiprocessing import get_context
+from pathlib import Path
 
 from planners.plan.answer import Plan, PlanResult
 from planners.plan.certify import certify
-from planners.plan.solve import BEAM, LEAST_SLACK_M, TOO_NARROW, LatticeSolver
-from planners.search.lattice import LatticeSettings
+from planners.plan.registry import OMPLS, OURS, Effort, Planner, planner_named
+from planners.plan.solve import BEAM, TOO_NARROW, LatticeSolver
+from planners.search.ompl_setup import MISSING, has_ompl
 from planners.search.problem import Problem
-from planners.search.tree import Step
+from srs_opt import plugins
 from srs_opt.parallel.interrupts import workers_deaf_to_interrupts
 
-CONTROL = ("rrt", "est", "kpiece")
-PLANNERS = ("lattice", "dubins-rrtconnect", "rs-rrtconnect", "kpiece", "est", "rrt")
-FIRST_NODES = 3000  # cycles that the lattice search looks at in the first round; doubled every round
-FIRST_ITERATIONS = 1000  # of an OMPL planner
+FIRST_NODES = 3000  # cycles that our searches look at in the first round; doubled every round
+FIRST_ITERATIONS = 1000  # of another planner
 ROUNDS = 5
-HALVINGS = 3  # of cells near walls, in the second lattice search
 WIDER = (50, 150, 500, 1500)  # beams that look for better plans
 
 
@@ -57,41 +56,46 @@ Tell = Callable[[str], None]
 
 
 def solve(problem: Problem, wish: Wish, tell: Tell = lambda message: None) -> PlanResult:
-    """Return the answer of the wanted planner, or of the portfolio."""
+    """Return the answer of the wanted planner, or of the portfolio.
+
+    Raises
+    ------
+    InputError
+        If there is no such planner.
+    """
     began = time.perf_counter()
-    if wish.planner == "lattice":
-        result = LatticeSolver(problem, time_limit_s=wish.time_limit_s, tell=tell).run()
-    elif wish.planner == "auto":
+    if wish.planner == "auto":
         result = _rounds(problem, wish, tell)
     else:
-        result = _ompl_alone(problem, wish, tell)
+        planner = planner_named(wish.planner)
+        if planner.solver is not None:
+            result = planner.solver(problem, time_limit_s=wish.time_limit_s, tell=tell).run()
+        else:
+            result = _alone(problem, wish, planner, tell)
     if wish.best and result.plan is not None:
         result = _better(problem, wish, result, tell)
     return replace(result, planning_s=time.perf_counter() - began)
 
 
 def _rounds(problem: Problem, wish: Wish, tell: Tell) -> PlanResult:
-    lattice = LatticeSolver(problem, time_limit_s=wish.time_limit_s, tell=tell)
-    # the second search tells places near walls apart more finely: slower, but it threads needles
-    fine = LatticeSolver(
-        problem,
-        LatticeSettings(most_halvings=HALVINGS, by_heading=True, slack_m=LEAST_SLACK_M),
-        beams=(),
-        time_limit_s=wish.time_limit_s,
-        tell=tell,
-    )
+    makers = [planner_named(name).solver for name in OURS]
+    ours = [make(problem, time_limit_s=wish.time_limit_s, tell=tell) for make in makers if make]
     began = time.perf_counter()
     for turn in range(ROUNDS):
-        for solver in (lattice, fine):
+        for solver in ours:
             result = solver.run(FIRST_NODES * 2**turn)
             if result.plan is not None or result.status == "infeasible" or result.reason == TOO_NARROW:
                 return result
-        if lattice.ended and fine.ended:
+        if all(solver.ended for solver in ours):
             return result
         left = wish.time_limit_s - (time.perf_counter() - began)
         if left <= 0:
             return result
-        tell(f"lattice: nothing among {lattice.looked_at} cycles; OMPL's planners look too")
+        if not has_ompl():
+            if not turn:
+                tell(f"{MISSING}: our own searches go on alone")
+            continue
+        tell(f"lattice: nothing among {ours[0].looked_at} cycles; OMPL's planners look too")
         plan = _ompl_round(problem, wish, FIRST_ITERATIONS * 2**turn, left)
         if plan is not None:
             return PlanResult("solved", plan, None, 0.0, result.effort)
@@ -101,15 +105,14 @@ def _rounds(problem: Problem, wish: Wish, tell: Tell) -> PlanResult:
 def _ompl_round(problem: Problem, wish: Wish, iterations: int, left_s: float) -> Plan | None:
     """Return the plan of the first planner in order that has a certified one."""
     deadline = time.perf_counter() + left_s
-    names = [name for name in PLANNERS if name != "lattice"]
     with ExitStack() as processes:  # one each: a planner that crashes takes no other with it
-        pools = [processes.enter_context(_worker()) for _ in names]
+        pools = [processes.enter_context(_worker()) for _ in OMPLS]
         with workers_deaf_to_interrupts():
             futures = [
-                pool.submit(ompl_gaits, problem, name, iterations, wish.seed)
-                for pool, name in zip(pools, names)
+                pool.submit(found_apart, problem, name, iterations, wish.seed)
+                for pool, name in zip(pools, OMPLS)
             ]
-        for name, future in zip(names, futures):
+        for name, future in zip(OMPLS, futures):
             plan = _certified(problem, name, _result(future, deadline - time.perf_counter()))
             if plan is not None:
                 return plan
@@ -124,39 +127,41 @@ def _result(future: Future[tuple[int, ...] | None], left_s: float) -> tuple[int,
         return None
 
 
-def _ompl_alone(problem: Problem, wish: Wish, tell: Tell) -> PlanResult:
-    """Return the answer of one OMPL planner, in a process of its own, in rounds with fresh seeds."""
+def _alone(problem: Problem, wish: Wish, planner: Planner, tell: Tell) -> PlanResult:
+    """Return the answer of one planner, in rounds with fresh seeds."""
     began = time.perf_counter()
     for turn in range(ROUNDS):
         left = wish.time_limit_s - (time.perf_counter() - began)
         if left <= 0:
             break
         iterations = FIRST_ITERATIONS * 2**turn
-        with _worker() as pool:
-            with workers_deaf_to_interrupts():
-                future = pool.submit(ompl_gaits, problem, wish.planner, iterations, wish.seed + turn)
-            gaits = _result(future, left)
-        plan = _certified(problem, wish.planner, gaits)
+        gaits = _found(problem, planner, iterations, wish.seed + turn, left)
+        plan = _certified(problem, planner.name, gaits)
         if plan is not None:
             return PlanResult("solved", plan, None, 0.0, {"iterations": iterations})
-        tell(f"{wish.planner}: no certified plan in {iterations} iterations")
+        tell(f"{planner.name}: no certified plan in {iterations} iterations")
     late = time.perf_counter() - began >= wish.time_limit_s
     within = f"within the time limit of {wish.time_limit_s:g} s" if late else f"in {ROUNDS} rounds"
-    reason = f"{wish.planner} found no plan that passes the certificate {within}; other planners may"
+    reason = f"{planner.name} found no plan that passes the certificate {within}; other planners may"
     return PlanResult("timeout" if late else "not_found", None, reason, 0.0, {"rounds": turn + 1})
 
 
-def ompl_gaits(problem: Problem, planner: str, iterations: int, seed: int) -> tuple[int, ...] | None:
-    """Return the gaits of an OMPL planner's way, or None (runs in a process of its own)."""
-    from planners.search.ompl_control import search_control
-    from planners.search.ompl_geometric import search_geometric
+def _found(
+    problem: Problem, planner: Planner, iterations: int, seed: int, left_s: float
+) -> tuple[int, ...] | None:
+    """Return what a planner finds, in a process of its own where it may take it down."""
+    if not planner.apart:
+        ends = time.perf_counter() + left_s
+        return planner.find(problem, Effort(iterations, seed, lambda: time.perf_counter() > ends))
+    with _worker() as pool:
+        with workers_deaf_to_interrupts():
+            future = pool.submit(found_apart, problem, planner.name, iterations, seed)
+        return _result(future, left_s)
 
-    way: list[Step] | None
-    if planner in CONTROL:
-        way = search_control(problem, planner, iterations, seed)
-    else:
-        way = search_geometric(problem, planner, iterations, seed)
-    return None if way is None else tuple(step.gait for step in way)
+
+def found_apart(problem: Problem, name: str, iterations: int, seed: int) -> tuple[int, ...] | None:
+    """Return the gaits of a planner's way, or None (runs in a process of its own)."""
+    return planner_named(name).find(problem, Effort(iterations, seed, lambda: False))
 
 
 def _certified(problem: Problem, planner: str, gaits: tuple[int, ...] | None) -> Plan | None:
@@ -186,7 +191,9 @@ def _better(problem: Problem, wish: Wish, result: PlanResult, tell: Tell) -> Pla
 @contextmanager
 def _worker() -> Iterator[ProcessPoolExecutor]:
     """Lend a fresh process that is ended for good afterwards, whatever it is doing."""
-    pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"))
+    pool = ProcessPoolExecutor(
+        1, mp_context=get_context("spawn"), initializer=_load_plugins, initargs=(plugins.files(),)
+    )
     try:
         yield pool
     finally:
@@ -194,3 +201,8 @@ def _worker() -> Iterator[ProcessPoolExecutor]:
         pool.shutdown(wait=False, cancel_futures=True)
         for process in processes:
             process.terminate()
+
+
+def _load_plugins(files: tuple[Path, ...]) -> None:
+    for file in files:
+        plugins.load_plugin(file)

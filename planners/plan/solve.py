@@ -50,6 +50,8 @@ class LatticeSolver:
         Tried one after the other before the best-first search.
     time_limit_s : float
         A guard only: what is found does not depend on it.
+    stop : callable
+        Another guard: says when to stop.
     tell : callable
         Gets messages about the progress.
     """
@@ -62,9 +64,10 @@ class LatticeSolver:
         *,
         beams: tuple[BeamSettings, ...] = BEAMS,
         time_limit_s: float = 30.0,
+        stop: Callable[[], bool] = lambda: False,
         tell: Callable[[str], None] = lambda message: None,
     ) -> None:
-        self.problem, self.tell = problem, tell
+        self.problem, self.stop, self.tell = problem, stop, tell
         self.settings, self.beams = settings or LatticeSettings(), beams
         if problem.goal.heading is not None:  # a map of places alone would lead past it
             self.settings = replace(self.settings, by_heading=True)
@@ -117,7 +120,7 @@ class LatticeSolver:
             way = self.search.advance(CHUNK)
             if way is not None:
                 return tuple(step.gait for step in way)
-            if time.perf_counter() - self.began > self.time_limit_s:
+            if self.stop() or time.perf_counter() - self.began > self.time_limit_s:
                 return self._answer("timeout", f"no plan within the time limit of {self.time_limit_s:g} s")
             if self.looked_at > last:
                 return self._answer("not_found", f"no plan among the first {self.looked_at} cycles looked at")

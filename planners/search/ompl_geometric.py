@@ -39,7 +39,8 @@ class Curves:
 def curves_of(problem: Problem) -> tuple[Curves, Curves]:
     """Return a comfortable and a tight assumption, from the table's gaits."""
     turning = [e for e in problem.gaits.gaits if e.radius_m is not None and e.speed_m_s > 0.05]
-    radii = np.array([abs(e.radius_m or 0.0) for e in turning])
+    # of the calibrated drive
+    radii = problem.drive.radius.value * np.array([abs(e.radius_m or 0.0) for e in turning])
     bands = np.array([sum(e.envelope_m) / 2 for e in turning])
     if not radii.size:
         return (Curves(1.0, problem.robot.body_width_m),) * 2
@@ -48,19 +49,24 @@ def curves_of(problem: Problem) -> tuple[Curves, Curves]:
     return easy, Curves(float(radii.min()), max(slimmest, problem.robot.body_width_m / 2))
 
 
-def search_geometric(problem: Problem, planner: str, iterations: int, seed: int) -> list[Step] | None:
+def search_geometric(
+    problem: Problem, kind: str, method: str, iterations: int, seed: int
+) -> list[Step] | None:
     """Return a way to the goal, or None.
 
     Parameters
     ----------
     problem : Problem
-    planner : {"dubins-bitstar", "dubins-rrtconnect", "rs-bitstar", "rs-rrtconnect"}
+    kind : {"dubins", "rs"}
+        Curves that only go forward, or Reeds and Shepp's.
+    method : str
+        Class of `ompl.geometric`.
     iterations : int
         After how many the planner gives up.
     seed : int
     """
     for curves in curves_of(problem):
-        path = geometric_path(problem, planner, curves, iterations, seed)
+        path = geometric_path(problem, kind, method, curves, iterations, seed)
         if path is not None:
             way = follow(problem, reference_along(problem, path))
             if way is not None:
@@ -69,25 +75,22 @@ def search_geometric(problem: Problem, planner: str, iterations: int, seed: int)
 
 
 def geometric_path(
-    problem: Problem, planner: str, curves: Curves, iterations: int, seed: int
+    problem: Problem, kind: str, method: str, curves: Curves, iterations: int, seed: int
 ) -> Array | None:
     """Return the poses (n, 3) of a path that the strip can follow, or None."""
     from ompl import geometric
 
     seeded(seed)
-    kind, method = planner.split("-")
     setup = strip_setup(problem, kind, curves)
     info = setup.getSpaceInformation()
-    made = {"bitstar": geometric.BITstar, "rrtconnect": geometric.RRTConnect}[method](info)
-    setup.setPlanner(made)
+    setup.setPlanner(getattr(geometric, method)(info))
     setup.setup()
     setup.solve(counted(iterations, setup.haveExactSolutionPath))
     if not setup.haveExactSolutionPath():
         return None
     path = setup.getSolutionPath()
-    if method == "rrtconnect":  # BIT* is already short; the simplifier's rounds are counted, not timed
-        simplifier = geometric.PathSimplifier(info)
-        simplifier.reduceVertices(path, 50, 50, 0.5)
+    # the simplifier's rounds are counted, not timed
+    geometric.PathSimplifier(info).reduceVertices(path, 50, 50, 0.5)
     return poses_along(path)
 
 

@@ -37,7 +37,7 @@ LAYERS = (
         "planners.search.follow",
         "planners.search.ompl_geometric",
     ),
-    ("planners.pilot",),
+    ("planners.benchmark", "planners.pilot"),
 )
 # a robot file names effects, so the catalogue of effects checks that part of the file
 ALLOWED = {

@@ -115,7 +115,7 @@ def test_bad_input_is_one_line(capsys, tmp_path, arguments, word):
     assert len(err.strip().splitlines()) == 1 and word in err
 
 
-@pytest.mark.parametrize("option", [["--start", "1,2"], ["--goal", "1,nan"], ["--planner", "magic"]])
+@pytest.mark.parametrize("option", [["--start", "1,2"], ["--goal", "1,nan"]])
 def test_bad_options_exit_2(option):
     with pytest.raises(SystemExit) as exit_:
         main([str(MAZES / "first.yaml"), *option])

@@ -1,0 +1,1 @@
+"""OMPL's own benchmark over every planner, on the planning problem itself."""
