@@ -68,6 +68,14 @@ def build_parser() -> Parser:
     how.add_argument(
         "--robots", type=Path, nargs="+", metavar="FILE", help="one gait for all of these robots"
     )
+    how.add_argument(
+        "--solver", choices=("ipopt", "fatrop", "sqpmethod"), default="ipopt",
+        help="of the nonlinear programs (default ipopt, for which the search is made)",
+    )  # fmt: skip
+    how.add_argument(
+        "--solver-option", action="append", default=[], metavar="KEY=VALUE",
+        help="an option of the solver's own, as max_iter=500 (repeat for several)",
+    )  # fmt: skip
     how.add_argument("--starts", type=positive_int, default=4, metavar="N", help="starting gaits (default 4)")
     how.add_argument("--warm", metavar="FILE", help="start from the gait of an earlier run (its gait.json)")
     return parser
@@ -112,6 +120,7 @@ def problem_from(options: argparse.Namespace) -> CycleProblem:
     """Return the problem that the options describe."""
     from srs_opt.errors import InputError
     from srs_opt.gait_opt.collocation.problem import CycleProblem
+    from srs_opt.gait_opt.collocation.solver import Solver
     from srs_opt.gait_opt.goal import Goal
     from srs_opt.robot import load_robot
 
@@ -129,7 +138,12 @@ def problem_from(options: argparse.Namespace) -> CycleProblem:
     if options.warm and options.valves == "free":
         raise InputError("--warm goes with --valves wave")
     return CycleProblem(
-        tuple(robots), chosen_model(options, robots[0]), goal, limits_from(options), options.intervals
+        tuple(robots),
+        chosen_model(options, robots[0]),
+        goal,
+        limits_from(options),
+        options.intervals,
+        solver=Solver.of_words(options.solver, options.solver_option),
     )
 
 

@@ -194,6 +194,7 @@ def _refined(problem: CycleProblem, gait: Gait, wave: Found, say: Callable[[str]
         gait=orbits[0].gait,
         orbits=orbits,
         certificate=certificate,
+        prices=exact.prices,
         steps=(*top.steps, *exact.steps),
         iterations=wave.iterations + top.iterations + sum(s.iterations for s in exact.steps),
     )
@@ -221,7 +222,14 @@ def relax(problem: CycleProblem, gait: Gait) -> Relaxation:
     z[levels] *= _PULLED
     z[p.layout.merit] = score(problem, gait, orbits).merit
     unknowns, rows, _ = bounded(loose, p, z, 2.0)
-    solution = p.solve(z, loose.parameters(p, mesh, scales, SMOOTHED_M_S), unknowns, rows, options=_IPOPT)
+    solution = p.solve(
+        z,
+        loose.parameters(p, mesh, scales, SMOOTHED_M_S),
+        unknowns,
+        rows,
+        options=_IPOPT,
+        solver=problem.solver,
+    )
     return Relaxation(
         float(solution.z[p.layout.unknown(0, "speed")]),
         solution.z[levels].reshape(ELEMENTS, -1),

@@ -242,7 +242,7 @@ def solve_from(
     z[p.layout.merit] = worth.merit / worth.scale
     unknowns, rows, binding = bounded(problem, p, z, reach)
     options = _QUICK if rung.quick else _ROAMING if problem.goal.turn == "side" else _PATIENT
-    solution = p.solve(z, parameters, unknowns, rows, options=options)
+    solution = p.solve(z, parameters, unknowns, rows, options=options, solver=problem.solver)
     return solution, p, binding(solution.z)
 
 

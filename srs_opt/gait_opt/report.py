@@ -11,6 +11,7 @@ from srs_opt.gait_opt.score import transport_cost
 from srs_opt.gait_opt.search import Found
 from srs_opt.orbit.steady import steady_gait
 
+_PRICES_TOLD = 4  # the dearest limits; the JSON has all
 _NOTHING_BEYOND = 0.5  # % of speed that rounding and the search's tolerance explain
 
 
@@ -75,6 +76,7 @@ def record(problem: CycleProblem, found: Found, solve_s: float, compile_s: float
         "starts": len(found.merits),
         "merits": list(found.merits),
         "populations": found.populations,
+        "limits": [price.record() for price in found.prices],
         "iterations": found.iterations,
         "interrupted": found.interrupted,
         "solve_s": solve_s,
@@ -101,6 +103,7 @@ def summary(answer: dict[str, Any]) -> str:
         f"gap after 50 cycles {certificate['periodicity_gap']:.1e}, "
         f"largest Floquet multiplier {certificate['largest_floquet_multiplier']:.2f}",
         *_others(certificate),
+        *(f"  {price['words']}" for price in answer["limits"][:_PRICES_TOLD]),
         *_freed(answer.get("free")),
         *_scattered(answer),
         *_worst(answer),

@@ -18,6 +18,7 @@ from srs_opt.gait_opt.finish import topped
 from srs_opt.gait_opt.goal import Goal
 from srs_opt.gait_opt.ladder import Climb, Rung, Step, climb, ladder, orbits_of
 from srs_opt.gait_opt.population import populations
+from srs_opt.gait_opt.prices import Price
 from srs_opt.gait_opt.reach import refuse_contradictions
 from srs_opt.gait_opt.score import Score, score
 from srs_opt.gait_opt.starts import starting_gaits, steered
@@ -68,6 +69,8 @@ class Found:
         Over all starts; the time includes compiling.
     interrupted : bool
         Whether Ctrl-C ended the search early.
+    prices : tuple of Price
+        What the limits that are active at the optimum cost.
     """
 
     gait: Gait
@@ -79,6 +82,7 @@ class Found:
     iterations: int
     seconds: float
     interrupted: bool
+    prices: tuple[Price, ...] = ()
 
 
 def search(
@@ -159,6 +163,7 @@ def search(
         sum(c.iterations for c in climbs.values()) + sum(s.iterations for s in exact.steps),
         time.perf_counter() - begun,
         interrupted,
+        exact.prices,
     )
 
 

@@ -14,6 +14,7 @@ from srs_opt.gait_opt.collocation.phases import Cuts, exchanged, phase_cuts, pha
 from srs_opt.gait_opt.collocation.problem import CycleProblem
 from srs_opt.gait_opt.collocation.refine import defects, refined_cuts
 from srs_opt.gait_opt.ladder import Report, Rung, Step, bounded, elements_until, orbits_of
+from srs_opt.gait_opt.prices import Price, prices
 from srs_opt.gait_opt.score import Score, score
 from srs_opt.orbit.steady import Orbit
 
@@ -32,13 +33,15 @@ _TOLERATED_LOSS = 1e-3
 
 @dataclass(frozen=True)
 class Polished:
-    """The result: gait, its orbits and score, the robots' speeds by the last good solve, the steps."""
+    """The result: gait, its orbits and score, the robots' speeds by the last good solve, the steps,
+    what the limits cost there."""
 
     gait: Gait
     orbits: tuple[Orbit, ...]
     score: Score
     claimed_m_s: tuple[float, ...]
     steps: tuple[Step, ...]
+    prices: tuple[Price, ...] = ()
 
 
 def optimize_switch_times(
@@ -55,10 +58,11 @@ def optimize_switch_times(
     best = score(problem, gait, orbits)
     claimed = tuple(o.speed_m_s for o in orbits)
     steps: list[Step] = []
+    cost: tuple[Price, ...] = ()
     order = switch_order(_switches(gait))
     cuts = phase_cuts(_switches(gait), order, *elements_until(orbits, _ELEMENTS))
     for _ in range(_ROUNDS):
-        trial, step, speeds, met, finer, binding = _solve(problem, gait, orbits, order, cuts, reach)
+        trial, step, speeds, met, finer, binding, active = _solve(problem, gait, orbits, order, cuts, reach)
         try:
             trial_orbits = orbits_of(problem, trial)
         except NoAnswerError:
@@ -69,7 +73,7 @@ def optimize_switch_times(
         steps.append(step)
         gain = found.total - best.total
         if not step.trouble and gain > -_TOLERATED_LOSS * best.scale:
-            claimed = speeds
+            claimed, cost = speeds, active
         if gain > 0:
             gait, orbits, best = trial, trial_orbits, found
         if report is not None:
@@ -85,7 +89,7 @@ def optimize_switch_times(
             reach /= 3
         if gain > 0 and binding:
             reach *= 2
-    return Polished(gait, orbits, best, claimed, tuple(steps))
+    return Polished(gait, orbits, best, claimed, tuple(steps), cost)
 
 
 def _switches(gait: Gait) -> np.ndarray:
@@ -99,7 +103,7 @@ def _solve(
     order: np.ndarray,
     cuts: Cuts,
     reach: float,
-) -> tuple[Gait, Step, tuple[float, ...], np.ndarray | None, Cuts, bool]:
+) -> tuple[Gait, Step, tuple[float, ...], np.ndarray | None, Cuts, bool, tuple[Price, ...]]:
     """Solve once.
 
     Returns
@@ -109,6 +113,7 @@ def _solve(
     order : the exchanged one, None if no switches met
     cuts : refined; the same object where nothing is to refine
     binding : whether the gait wanted to move further than `reach`
+    prices : what the active limits cost
     """
     own = max(r.friction_speed_m_s for r in problem.robots)
     mesh, times = phase_times(_switches(gait), order, cuts)
@@ -118,7 +123,7 @@ def _solve(
     z[p.layout.merit] = worth.merit / worth.scale
     parameters = problem.parameters(p, mesh, scales, own, worth.scale)
     unknowns, rows, binding = bounded(problem, p, z, reach)
-    solution = p.solve(z, parameters, unknowns, rows, options=_IPOPT)
+    solution = p.solve(z, parameters, unknowns, rows, options=_IPOPT, solver=problem.solver)
     trial = gait_from(p.layout, solution.z)
     speeds = tuple(float(solution.z[p.layout.unknown(r, "speed")]) for r in range(len(problem.robots)))
     defect = defects(p, solution, parameters, mesh)
@@ -130,4 +135,4 @@ def _solve(
     if mesh.elements < _MOST_ELEMENTS and defect.max() > _DEFECT:
         finer = refined_cuts(defect, cuts, _DEFECT)
     met = exchanged(solution.z[2 : 2 + p.layout.switches], order)
-    return trial, step, speeds, met, finer, binding(solution.z)
+    return trial, step, speeds, met, finer, binding(solution.z), prices(problem, p, solution, worth.scale)

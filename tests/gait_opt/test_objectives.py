@@ -8,15 +8,20 @@ import numpy as np
 import pytest
 
 from srs_opt.errors import InputError
-from srs_opt.gait import Wave
+from srs_opt.gait import Wave, published_wave
+from srs_opt.gait_opt import search as search_module
 from srs_opt.gait_opt.aim import on_ticks
 from srs_opt.gait_opt.certificate import certify
-from srs_opt.gait_opt.collocation.guess import unknowns_from_orbits
+from srs_opt.gait_opt.collocation.guess import gait_from, unknowns_from_orbits
 from srs_opt.gait_opt.collocation.layout import Mesh
 from srs_opt.gait_opt.collocation.problem import CycleProblem
+from srs_opt.gait_opt.collocation.solver import Solver
 from srs_opt.gait_opt.goal import Goal, Limits
+from srs_opt.gait_opt.ladder import Rung, orbits_of, solve_from
 from srs_opt.gait_opt.objectives.objective import Objective
 from srs_opt.gait_opt.objectives.registry import built_in, objective_named, register_objective
+from srs_opt.gait_opt.optimize import optimize_gait
+from srs_opt.gait_opt.prices import prices
 from srs_opt.gait_opt.score import evaluated, score
 from srs_opt.orbit.steady import steady_gait
 from srs_opt.robot import wpi_srs
@@ -116,3 +121,64 @@ def test_objectives_travel_and_are_known_by_name():
 def test_formulas_that_are_none_are_refused(merit, word):
     with pytest.raises(InputError, match=word):
         _ = problem(Goal(Objective("odd", merit))).formulas
+
+
+@pytest.fixture(scope="module")
+def optimum():
+    """Case, gait, rung, solution and program of an optimum at smoothed friction."""
+    case = replace(problem(Goal()), limits=Limits(pressure_kpa=(41.0, 43.0)))
+    rung = Rung(0.03, 24, 0.3, 1)
+    start = published_wave(ROBOT, 2.0, 41.0).gait()
+    for _ in range(3):
+        solution, p, _ = solve_from(case, start, orbits_of(case, start, 0.03), rung, 0.3)
+        start = gait_from(p.layout, solution.z)
+    return case, start, rung, solution, p
+
+
+def test_prices_of_limits_are_what_a_step_brings(optimum):
+    case, gait, rung, solution, p = optimum
+    orbits = orbits_of(case, gait, 0.03)
+    worth = score(case, gait, orbits).scale
+    told = {price.limit: price for price in prices(case, p, solution, worth)}
+    assert "the highest frequency raised by 0.1 Hz would buy" in told["the highest frequency"].words
+    for limit, changed, share in (
+        ("the highest pressure", Limits(pressure_kpa=(41.0, 43.2)), 0.2),
+        ("the highest frequency", Limits((1.0, 2.02), (41.0, 43.0)), 0.2),
+    ):
+        again, q, _ = solve_from(replace(case, limits=changed), gait, orbits, rung, 0.3)
+        gained = worth * (again.z[q.layout.merit] - solution.z[p.layout.merit])
+        assert gained == pytest.approx(share * told[limit].merit, rel=0.1)
+
+
+def test_other_solvers_take_the_same_program(optimum):
+    case, gait, rung, *_ = optimum
+    orbits = orbits_of(case, gait, 0.03)
+    short = Solver("sqpmethod", (("max_iter", 2),))
+    other, _, _ = solve_from(replace(case, solver=short), gait, orbits, rung, 0.3)
+    assert not other.converged
+    assert np.isfinite(other.z).all()
+    one = Solver.of_words("ipopt", ["max_iter=1"])
+    assert solve_from(replace(case, solver=one), gait, orbits, rung, 0.3)[0].iterations == 1
+    with pytest.raises(InputError, match="solver ipopt with options fly=1"):
+        solve_from(replace(case, solver=Solver.of_words("ipopt", ["fly=1"])), gait, orbits, rung, 0.3)
+    with pytest.raises(InputError, match="KEY=VALUE"):
+        Solver.of_words("ipopt", ["fly"])
+    with pytest.raises(InputError, match="solver must be"):
+        Solver("snopt")
+
+
+def test_an_objective_of_ones_own_is_optimized(monkeypatch):
+    """Least pressure at a least speed: the constraint is active in the simulated motion."""
+    monkeypatch.setattr(search_module, "ladder", lambda own_m_s, **how: (Rung(0.03, 28, 0.1, 2),))
+
+    def gentle(cycle):
+        return -cycle.pressure_kpa / 50
+
+    def fast_enough(cycle):
+        return 0.2, cycle.speed_m_s, 0.6
+
+    found = optimize_gait(ROBOT, gentle, [fast_enough], limits=Limits(pressure_kpa=(10.0, 55.0)), starts=1)
+    assert found.certificate.passed, found.certificate.failures
+    assert found.gait.pressure_kpa < 35
+    assert found.certificate.speed_m_s == pytest.approx(0.2, abs=0.012)
+    assert any("constraint fast_enough" in price.words for price in found.prices)

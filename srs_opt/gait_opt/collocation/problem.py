@@ -11,7 +11,8 @@ from srs_opt.gait_opt.collocation.goal_rows import GoalKind, Times
 from srs_opt.gait_opt.collocation.guess import parameter_numbers
 from srs_opt.gait_opt.collocation.layout import ENVELOPE_UNIT_M, PRESSURE_UNIT_KPA, Layout, Mesh
 from srs_opt.gait_opt.collocation.point import QUADRATURES, PointKind
-from srs_opt.gait_opt.collocation.program import Program, program
+from srs_opt.gait_opt.collocation.program import IPOPT, Program, program
+from srs_opt.gait_opt.collocation.solver import Solver
 from srs_opt.gait_opt.goal import LEAST_TURN_RAD_S, STRAIGHT_RAD_S, TURN_ERROR, Goal, Limits
 from srs_opt.gait_opt.objectives.objective import Formulas, formulas
 from srs_opt.model.parameters import Structure
@@ -39,6 +40,7 @@ class CycleProblem:
         On-intervals per segment.
     relaxed : bool
         Valves may take any value in [-1, 1], on a grid of the mesh's elements.
+    solver : Solver
     """
 
     robots: tuple[Robot, ...]
@@ -47,6 +49,7 @@ class CycleProblem:
     limits: Limits
     intervals: int = 1
     relaxed: bool = False
+    solver: Solver = IPOPT
 
     @property
     def formulas(self) -> Formulas:

@@ -14,19 +14,17 @@ from scipy import sparse
 from srs_opt.gait_opt.collocation.goal_rows import GOAL_NUMBERS, GoalKind, Times, goal_rows
 from srs_opt.gait_opt.collocation.layout import ROBOT_UNKNOWNS, Layout, local_inputs, row_outputs
 from srs_opt.gait_opt.collocation.point import PointKind, point_functions
+from srs_opt.gait_opt.collocation.solver import Solver, nlp_solver
 from srs_opt.gait_opt.collocation.sparse import Gather, hessian_gather, jacobian_gather, to_dm
 from srs_opt.model.registry import build
 from srs_opt.parallel.interrupts import interrupt_not_lost
 
-_MINIMUM_DEGREE = 0  # MUMPS's ordering: quicker here than its own choice; METIS draws at random, bits differ
-# starts are simulated motions, nearly feasible: steps that leave their neighbourhood follow the linearized
-# friction to where nothing holds any more, and dozens of iterations find no way back
-_FEASIBLE = 3.0
+IPOPT = Solver()
 
 
 @dataclass(frozen=True)
 class Solution:
-    """Where IPOPT stopped.
+    """Where the solver stopped.
 
     Attributes
     ----------
@@ -34,7 +32,7 @@ class Solution:
     rows : array
         Values of the constraints.
     status : str
-        IPOPT's own word.
+        The solver's own word.
     iterations : int
     converged : bool
     """
@@ -169,21 +167,10 @@ class Program:
         g, jac = first(head, numbers, robots)
         return g, jac, second(head, numbers, robots, lam)
 
-    def _solver(self, **changes: Any) -> ca.Function:
-        key = tuple(sorted(changes.items()))
+    def _solver(self, solver: Solver, stage: Mapping[str, Any]) -> ca.Function:
+        key = (solver, tuple(sorted(stage.items())))
         if key not in self._solvers:
-            ipopt = {
-                "print_level": 0, "sb": "yes", "mu_strategy": "adaptive", "max_iter": 300, "tol": 1e-6,
-                "linear_solver": "mumps", "mumps_pivot_order": _MINIMUM_DEGREE,
-                "acceptable_tol": 1e-5, "acceptable_iter": 8, "warm_start_init_point": "no",
-                "nlp_scaling_method": "none", "theta_max_fact": _FEASIBLE,
-                **changes,
-            }  # fmt: skip
-            options = {
-                **self._options, "ipopt": ipopt, "print_time": False, "calc_lam_p": False,
-                "no_nlp_grad": True, "error_on_fail": False, "show_eval_warnings": False,
-            }  # fmt: skip
-            self._solvers[key] = ca.nlpsol("gait", "ipopt", self._nlp, options)
+            self._solvers[key] = nlp_solver(solver, stage, self._nlp, self._options)
         return self._solvers[key]
 
     def solve(
@@ -194,8 +181,12 @@ class Program:
         bounds_g: tuple[np.ndarray, np.ndarray],
         warm: Solution | None = None,
         options: Mapping[str, Any] | None = None,
+        solver: Solver = IPOPT,
     ) -> Solution:
-        """Solve from `z`; with `warm`, multipliers are taken over and the barrier starts low."""
+        """Solve from `z`; with `warm`, multipliers are taken over and the barrier starts low.
+
+        `options` are IPOPT's for this stage; those of `solver` go before them.
+        """
         arguments = {
             "x0": z, "p": parameters,
             "lbx": bounds_z[0], "ubx": bounds_z[1], "lbg": bounds_g[0], "ubg": bounds_g[1],
@@ -207,17 +198,17 @@ class Program:
                 "warm_start_mult_bound_push": 1e-6, "mu_strategy": "monotone", **changes,
             }  # fmt: skip
             arguments |= {"lam_g0": warm.multipliers_g, "lam_x0": warm.multipliers_z}
-        solver = self._solver(**changes)
+        function = self._solver(solver, changes)
         with interrupt_not_lost():
-            out = solver(**arguments)
-        stats = solver.stats()
+            out = function(**arguments)
+        stats = function.stats()
         return Solution(
             np.asarray(out["x"]).ravel(),
             np.asarray(out["lam_g"]).ravel(),
             np.asarray(out["lam_x"]).ravel(),
             np.asarray(out["g"]).ravel(),
-            stats["return_status"],
-            int(stats["iter_count"]),
+            str(stats.get("return_status", "")),
+            int(stats.get("iter_count", 0)),
             bool(stats["success"]),
         )
 

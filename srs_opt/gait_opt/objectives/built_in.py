@@ -37,12 +37,23 @@ def turning(cycle: GaitCycle) -> ca.SX:
     return TURN_WEIGHT_S * ca.fabs(cycle.turn_rate_rad_s)
 
 
-SPEED = Objective("speed", speed, "fastest", quick=True)
-TRANSPORT = Objective("transport", economy, "least energy per weight and distance", least_speed=True)
-TIGHTEST = Objective("tightest", tightness, "smallest radius", turn="side", least_speed=True)
+SPEED = Objective("speed", speed, "fastest", quick=True, unit="m/s")
+TRANSPORT = Objective(
+    "transport", economy, "least energy per weight and distance", least_speed=True,
+    unit="less cost of transport",
+)  # fmt: skip
+TIGHTEST = Objective(
+    "tightest", tightness, "smallest radius", turn="side", least_speed=True,
+    unit="m less radius", unit_per_merit=1 / RADIUS_WEIGHT_1_M,
+)  # fmt: skip
 TURN = Objective(
-    "turn", speed, "tightest turn (with --radius or --turn-rate: fastest)", least_speed=True,
+    "turn", speed, "tightest turn (with --radius or --turn-rate: fastest)", least_speed=True, unit="m/s",
     unless_turn=TIGHTEST,
 )  # fmt: skip
-PIVOT = Objective("pivot", turning, "most turn rate", turn="side")
-SLIM = Objective("slim", slimness, "slimmest swept band", least_speed=True, needs_speed=True)
+PIVOT = Objective(
+    "pivot", turning, "most turn rate", turn="side", unit="rad/s", unit_per_merit=1 / TURN_WEIGHT_S
+)
+SLIM = Objective(
+    "slim", slimness, "slimmest swept band", least_speed=True, needs_speed=True,
+    unit="m less band", unit_per_merit=BAND_UNIT_M,
+)  # fmt: skip

@@ -41,6 +41,10 @@ class Objective:
         Whether a wanted speed must be given.
     quick : bool
         Whether rough optima found early do, as where nothing but the speed straight ahead counts.
+    unit : str
+        Of what the merit stands for, with its sense ("m/s", "m less radius").
+    unit_per_merit : float
+        How many of them a merit of 1 is.
     unless_turn : Objective, optional
         What takes its place where no radius or turn rate is wanted.
     definition : str
@@ -55,6 +59,8 @@ class Objective:
     least_speed: bool = False
     needs_speed: bool = False
     quick: bool = False
+    unit: str = field(default="", compare=False, repr=False)
+    unit_per_merit: float = field(default=1.0, compare=False, repr=False)
     unless_turn: Objective | None = None
     definition: str = field(init=False)
 
