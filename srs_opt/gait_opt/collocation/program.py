@@ -202,8 +202,9 @@ class Program:
         with interrupt_not_lost():
             out = function(**arguments)
         stats = function.stats()
+        found = np.asarray(out["x"]).ravel()
         return Solution(
-            np.asarray(out["x"]).ravel(),
+            found if np.isfinite(found).all() else z,  # a solver that lost its way led nowhere
             np.asarray(out["lam_g"]).ravel(),
             np.asarray(out["lam_x"]).ravel(),
             np.asarray(out["g"]).ravel(),
