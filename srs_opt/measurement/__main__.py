@@ -5,8 +5,12 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from srs_opt.command import Answer, Parser, make_parser, run_command, say
+
+if TYPE_CHECKING:
+    from srs_opt.measurement.records import DataSet
 
 
 def build_parser() -> Parser:
@@ -22,6 +26,11 @@ def build_parser() -> Parser:
         "--analyse",
         action="store_true",
         help="also measure: motion per trial with intervals, map, friction, actuator, tow; written to --out",
+    )
+    parser.add_argument(
+        "--steps",
+        action="store_true",
+        help="make DATASET/bench/steps.csv from the trials of kind step (floor 'lifted' or not)",
     )
     parser.add_argument("dataset", type=Path, metavar="DATASET", help="folder with dataset.yaml")
     return parser
@@ -43,6 +52,9 @@ def run(options: argparse.Namespace) -> Answer:
         if options.json:
             _print_json(listed)
         raise InputError(f"{options.dataset}: {len(errors)} error(s), first: {errors[0]}")
+    files: tuple[Path, ...] = ()
+    if options.steps:
+        dataset, files = _with_steps(dataset, options)
     bench = dataset.bench
     record = {
         "name": dataset.name,
@@ -60,12 +72,29 @@ def run(options: argparse.Namespace) -> Answer:
         f"{len(listed)} warning(s)"
     )
     if not options.analyse:
-        return Answer(record, summary)
+        return Answer(record, summary, files=files)
     from srs_opt.measurement.analyse import analyse, describe, write_analysis
 
     analysis = analyse(dataset)
-    files = write_analysis(dataset, analysis, options.out)
+    files = (*files, *write_analysis(dataset, analysis, options.out))
     return Answer({**record, "analysis": analysis}, f"{summary}\n{describe(analysis)}", files=files)
+
+
+def _with_steps(dataset: DataSet, options: argparse.Namespace) -> tuple[DataSet, tuple[Path, ...]]:
+    """Return the data set with step tests made from its trials, which are written beside them."""
+    from dataclasses import replace
+
+    from srs_opt.errors import InputError
+    from srs_opt.measurement.dataset import write_steps
+    from srs_opt.measurement.take_steps import steps_of
+
+    path = options.dataset / "bench" / "steps.csv"
+    if path.exists():
+        raise InputError(f"{path}: is there already; move it away first")
+    steps, notes = steps_of(dataset)
+    for note in notes:
+        say(options, f"warning: {note}")
+    return replace(dataset, bench=replace(dataset.bench, steps=steps)), (write_steps(steps, path),)
 
 
 def _mean(values: list[float]) -> float | None:

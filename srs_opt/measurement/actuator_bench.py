@@ -11,6 +11,8 @@ from srs_opt.errors import InputError
 from srs_opt.measurement.records import CONDITIONS, Array
 from srs_opt.measurement.steps import StepFit, time_constants
 
+NOT_PROPORTIONAL = 0.01  # probability of the trend below which C0 is given as a curve over pressure
+
 
 @dataclass(frozen=True)
 class Mean:
@@ -38,8 +40,17 @@ class TimeConstants:
 
 
 @dataclass(frozen=True)
+class CurveValue:
+    """C0 at one pressure: mean over its tests, with its standard deviation."""
+
+    pressure_kpa: float
+    c0_1_m: float
+    sd_1_m: float
+
+
+@dataclass(frozen=True)
 class CurvatureOverPressure:
-    """C0 = slope times pressure, through the origin.
+    """C0 = slope times pressure, through the origin; a curve where the tests ask for it.
 
     Attributes
     ----------
@@ -48,11 +59,14 @@ class CurvatureOverPressure:
     lack_of_fit_p : float or None
         Probability of a trend of C0/pressure with pressure at least this strong if C0 were proportional to
         pressure; None with fewer than three tests or a single pressure. Small: not proportional.
+    curve : tuple of CurveValue
+        C0 at every pressure, where it is not proportional (`NOT_PROPORTIONAL`); else empty.
     """
 
     condition: str
     slope_1_m_kpa: Mean
     lack_of_fit_p: float | None
+    curve: tuple[CurveValue, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -120,7 +134,13 @@ def _curvature(condition: str, fits: list[StepFit]) -> CurvatureOverPressure:
 
         line = linregress(pressure, slopes)
         p_value = float(line.pvalue) if np.isfinite(line.pvalue) else None
-    return CurvatureOverPressure(condition, weighted_mean(slopes, np.maximum(sds, 1e-12)), p_value)
+    sds = np.maximum(sds, 1e-12)
+    curve: tuple[CurveValue, ...] = ()
+    if p_value is not None and p_value < NOT_PROPORTIONAL:
+        groups = [(p, pressure == p) for p in sorted(set(pressure.tolist()))]
+        means = [(p, weighted_mean(slopes[own], sds[own])) for p, own in groups]
+        curve = tuple(CurveValue(p, p * m.value, p * m.sd) for p, m in means)
+    return CurvatureOverPressure(condition, weighted_mean(slopes, sds), p_value, curve)
 
 
 def _constants(condition: str, pressure: float | None, fits: list[StepFit]) -> TimeConstants:

@@ -124,6 +124,12 @@ def describe(record: dict[str, Any]) -> str:
         lines.append(
             f"  C0 over pressure, {curvature['condition']}: {slope['value']:.4f} ± {slope['sd']:.4f} 1/m/kPa"
         )
+        if curvature["curve"]:
+            points = ", ".join(
+                f"{v['c0_1_m']:.3g} ± {v['sd_1_m']:.2g} at {v['pressure_kpa']:g} kPa"
+                for v in curvature["curve"]
+            )
+            lines.append(f"    not proportional (p = {curvature['lack_of_fit_p']:.1g}); C0, 1/m: {points}")
     if "bending" in record:
         lines.append(f"  {_bending_words(BendingFit(**record['bending']))}")
     return "\n".join(lines)

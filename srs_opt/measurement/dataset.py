@@ -148,19 +148,7 @@ def _write_trials(trials: Sequence[Trial], path: Path) -> None:
 
 def _write_bench(bench: Bench, folder: Path) -> None:
     if bench.steps:
-        steps = (
-            [
-                s.test,
-                "" if s.segment is None else s.segment,
-                s.condition,
-                _text(s.pressure_kpa),
-                _text(t),
-                _text(k),
-            ]
-            for s in bench.steps
-            for t, k in zip(s.time_s, s.curvature_1_m)
-        )
-        _write_table(folder / "steps.csv", bench_files.STEP_COLUMNS, steps)
+        write_steps(bench.steps, folder / "steps.csv")
     plain = (
         ("spring_car", bench_files.SPRING_CAR_COLUMNS, bench.spring_car),
         ("tow", bench_files.TOW_COLUMNS, bench.tow),
@@ -170,6 +158,24 @@ def _write_bench(bench: Bench, folder: Path) -> None:
         if records:
             rows = ([_text(getattr(record, column)) for column in columns] for record in records)
             _write_table(folder / f"{name}.csv", columns, rows)
+
+
+def write_steps(steps: Sequence[StepTest], path: Path) -> Path:
+    """Write step tests as bench/steps.csv holds them."""
+    rows = (
+        [
+            s.test,
+            "" if s.segment is None else s.segment,
+            s.condition,
+            _text(s.pressure_kpa),
+            _text(t),
+            _text(k),
+        ]
+        for s in steps
+        for t, k in zip(s.time_s, s.curvature_1_m)
+    )
+    _write_table(path, bench_files.STEP_COLUMNS, rows)
+    return path
 
 
 def _write_table(path: Path, columns: Sequence[str], rows: Iterable[Iterable[object]]) -> None:
@@ -208,4 +214,5 @@ __all__ = [
     "Trial",
     "load_dataset",
     "write_dataset",
+    "write_steps",
 ]

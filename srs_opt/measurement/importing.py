@@ -47,6 +47,7 @@ OPTIONAL = (
     "replicate_of",
     "kind",
 )
+BEFORE_STEP_S = 0.3
 SETTLED_S = 0.6  # after the first motion the bends repeat from cycle to cycle within their noise
 SAME_RATE = 1e-3  # rates found from rounded times differ by less
 SCALES = ((1.0, "metres"), (1e-3, "millimetres"), (1e-2, "centimetres"), (0.0254, "inches"))
@@ -340,6 +341,12 @@ def _valve_start(
             spare = first - told - run_in_s(gait.frequency_hz)
             told += max(0, math.floor(spare * gait.frequency_hz)) / gait.frequency_hz
         return Onset(told, math.nan, moving=moving)
+    if row.text("kind") == "step":
+        moved = first_motion(tracks.reshape(len(tracks), -1), noise_sd(tracks))
+        if moved is None:
+            raise InputError(f"{source.source}: the markers never move (kind step): give valve_start_s")
+        # a few frames at rest tell the curvature before; the step's fit finds its own delay
+        return Onset(max(float(source.time_s[moved]) - BEFORE_STEP_S, first), math.nan)
     onset = find_onset(robot, gait, source.time_s, tracks, options.spots)
     if onset.doubt:
         known = "phase of the valves" if onset.moving else "start"
