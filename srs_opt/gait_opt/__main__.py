@@ -76,6 +76,15 @@ def build_parser() -> Parser:
         "--solver-option", action="append", default=[], metavar="KEY=VALUE",
         help="an option of the solver's own, as max_iter=500 (repeat for several)",
     )  # fmt: skip
+    how.add_argument(
+        "--stiffness", type=positive_float, nargs="+", metavar="EI",
+        help="one gait for all of these bending stiffnesses, N m^2 (for example 0.002 0.005 0.02)",
+    )  # fmt: skip
+    how.add_argument(
+        "--worst", choices=("relative", "absolute"),
+        help="which of several robots counts: the slowest beside its published gait (default where speed is "
+        "wanted), or the slowest",
+    )  # fmt: skip
     how.add_argument("--starts", type=positive_int, default=4, metavar="N", help="starting gaits (default 4)")
     how.add_argument("--warm", metavar="FILE", help="start from the gait of an earlier run (its gait.json)")
     return parser
@@ -122,6 +131,7 @@ def problem_from(options: argparse.Namespace) -> CycleProblem:
     from srs_opt.gait_opt.collocation.problem import CycleProblem
     from srs_opt.gait_opt.collocation.solver import Solver
     from srs_opt.gait_opt.goal import Goal
+    from srs_opt.gait_opt.robust import relative
     from srs_opt.robot import load_robot
 
     robots: list[Robot] = [load_robot(path) for path in options.robots or [options.robot]]
@@ -131,13 +141,14 @@ def problem_from(options: argparse.Namespace) -> CycleProblem:
         options.objective, options.speed, options.radius, options.turn_rate, options.envelope,
         options.least_speed, options.side,
     )  # fmt: skip
+    robots = softened(options, robots)
     if options.intervals > 1 and options.valves != "free":
         raise InputError("--intervals goes with --valves free: a wave has one interval per segment and cycle")
     if options.intervals > MOST_INTERVALS:
         raise InputError(f"--intervals {options.intervals}: at most {MOST_INTERVALS} on-intervals per cycle")
     if options.warm and options.valves == "free":
         raise InputError("--warm goes with --valves wave")
-    return CycleProblem(
+    problem = CycleProblem(
         tuple(robots),
         chosen_model(options, robots[0]),
         goal,
@@ -145,6 +156,34 @@ def problem_from(options: argparse.Namespace) -> CycleProblem:
         options.intervals,
         solver=Solver.of_words(options.solver, options.solver_option),
     )
+    if options.worst == "relative" and not goal.merit_is_speed:
+        raise InputError("--worst relative compares speeds: use it with objective speed, or turn on a radius")
+    if len(robots) > 1 and goal.merit_is_speed and options.worst != "absolute":
+        return relative(problem)
+    return problem
+
+
+def softened(options: argparse.Namespace, robots: list[Robot]) -> list[Robot]:
+    """Return the robots with the stiffnesses that are asked for, or that a robot's file leaves open."""
+    from srs_opt.errors import InputError
+    from srs_opt.gait_opt.robust import of_stiffness, stiffness_interval
+
+    if options.stiffness:
+        if options.robots:
+            raise InputError("give --stiffness EI... or --robots FILE..., not both")
+        if options.model not in (None, "compliant"):
+            raise InputError(f"--stiffness goes with --model compliant, not with {options.model}")
+        return [of_stiffness(robots[0], ei) for ei in options.stiffness]
+    soft = [r for r in robots if r.is_soft]
+    if options.model is None and soft and len(soft) < len(robots):
+        rigid = next(r for r in robots if not r.is_soft)
+        raise InputError(
+            f"robot '{rigid.name}' is rigid and '{soft[0].name}' is soft: give all of them a "
+            "bending_stiffness_n_m2, or choose a model with --model complex"
+        )
+    if len(robots) == 1 and options.model in (None, "compliant"):
+        return list(stiffness_interval(robots[0]))
+    return robots
 
 
 def limits_from(options: argparse.Namespace) -> Limits:
@@ -181,6 +220,12 @@ def run(options: argparse.Namespace) -> Answer:
     from srs_opt.simulate import compiled
 
     problem = problem_from(options)
+    if len(problem.robots) > 1 and not options.robots and not options.stiffness:
+        say(
+            options,
+            f"note: robot '{problem.robots[0].name}' gives its stiffness with a deviation: one gait for two "
+            "standard deviations to either side; --stiffness EI for one value alone",
+        )
     for robot in problem.robots:
         if effects := room_effects(robot):
             say(
@@ -211,6 +256,10 @@ def run(options: argparse.Namespace) -> Answer:
 
 def _run_table(options: argparse.Namespace) -> Answer:
     """Build the gait table and write it as JSON, CSV and C header."""
+    from srs_opt.errors import InputError
+
+    if options.stiffness or options.robots or options.worst:
+        raise InputError("--table is built for one robot: without --stiffness, --robots and --worst")
     import shutil
     import time
 

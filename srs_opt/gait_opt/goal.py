@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from srs_opt.errors import InputError
+from srs_opt.gait_opt.objectives.built_in import SPEED
 from srs_opt.gait_opt.objectives.objective import Objective
 from srs_opt.gait_opt.objectives.registry import objective_named
 from srs_opt.robot import Robot
@@ -122,6 +123,11 @@ class Goal:
     def only_fast(self) -> bool:
         """Whether nothing is wanted but speed straight ahead."""
         return self.aim.quick and self.turn == "straight" and self.envelope_m is None
+
+    @property
+    def merit_is_speed(self) -> bool:
+        """Whether the gait that runs fastest is the best."""
+        return self.aim.merit is SPEED.merit
 
 
 @dataclass(frozen=True)

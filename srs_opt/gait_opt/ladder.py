@@ -65,7 +65,10 @@ class Step:
     speed_m_s, simulated_m_s : float
         By collocation and by simulation at the rung's smoothing speed.
     iterations : int
-    status : str
+    trouble : str
+    astray : float
+        Largest difference of the two over the robots, relative: large where simulation from rest leads to
+        another orbit than the one collocated.
     """
 
     rung: Rung
@@ -75,6 +78,7 @@ class Step:
     trouble: str = ""
     elements: int = 0
     defect: float | None = None
+    astray: float = 0.0
 
     @staticmethod
     def of_record(record: dict[str, Any]) -> Step:
@@ -187,8 +191,11 @@ def _rung(problem: CycleProblem, gait: Gait, rung: Rung, report: Report | None) 
         speed = float(solution.z[p.layout.unknown(0, "speed")])
         trouble = explained(p, solution, trial)
         steps.append(
-            Step(rung, speed, trial_orbits[0].speed_m_s, solution.iterations, trouble, p.layout.elements)
-        )
+            Step(
+                rung, speed, trial_orbits[0].speed_m_s, solution.iterations, trouble, p.layout.elements,
+                astray=_astray(p, solution, trial_orbits),
+            )
+        )  # fmt: skip
         better = found.total > best.total
         if better:
             gait, orbits, gained, best = trial, trial_orbits, found.total - best.total, found
@@ -201,6 +208,11 @@ def _rung(problem: CycleProblem, gait: Gait, rung: Rung, report: Report | None) 
             if solution.converged and not binding:
                 break
     return gait, steps
+
+
+def _astray(p: Program, solution: Solution, orbits: tuple[Orbit, ...]) -> float:
+    claimed = (float(solution.z[p.layout.unknown(r, "speed")]) for r in range(len(orbits)))
+    return max(abs(c - o.speed_m_s) / max(abs(o.speed_m_s), 1e-9) for c, o in zip(claimed, orbits))
 
 
 def mesh_for(orbits: tuple[Orbit, ...], elements: int) -> Mesh:

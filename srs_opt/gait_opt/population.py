@@ -36,7 +36,7 @@ _NOTHING = 1e3  # cost of a gait without a steady state
 
 
 @dataclass(frozen=True)
-class _Coordinates:
+class Coordinates:
     """Frequency and pressure over their limits, on-times after the first, lengths (held where straight)."""
 
     problem: CycleProblem
@@ -47,6 +47,7 @@ class _Coordinates:
         return self.problem.goal.turn == "straight"
 
     def of(self, gait: Gait) -> np.ndarray:
+        """Return the coordinates of a gait."""
         limits = self.problem.limits
         ranges = ((gait.frequency_hz, limits.frequency_hz), (gait.pressure_kpa, limits.pressure_kpa))
         head = [(value - low) / max(high - low, 1e-9) for value, (low, high) in ranges]
@@ -55,6 +56,7 @@ class _Coordinates:
         return np.array([*head, *(middles[1:] - middles[0]), *([] if self.straight else off - on)])
 
     def gait(self, x: np.ndarray) -> Gait:
+        """Return the gait at coordinates `x`, inside the limits whatever they are."""
         limits, segments = self.problem.limits, self.problem.robots[0].segments
         (f_low, f_high), (p_low, p_high) = limits.frequency_hz, limits.pressure_kpa
         frequency = f_low + float(_reflected(x[0])) * (f_high - f_low)
@@ -126,14 +128,14 @@ def evolved(problem: CycleProblem, start: Gait, seed: int, evaluations: int) -> 
     """
     import cma
 
-    at = _Coordinates(problem)
+    at = Coordinates(problem)
     options = {"seed": seed + 1, "popsize": SIZE, "maxfevals": evaluations, "tolfun": _DONE, "verbose": -9}
     strategy = cma.CMAEvolutionStrategy(at.of(start), _SPREAD, options)
-    best, least = start, _costs(problem, [start])[0]
+    best, least = start, simulated_costs(problem, [start])[0]
     while not strategy.stop():
         asked = strategy.ask()
         gaits = [at.gait(x) for x in asked]
-        costs = _costs(problem, gaits)
+        costs = simulated_costs(problem, gaits)
         strategy.tell(asked, costs)
         k = int(np.argmin(costs))
         if costs[k] < least:
@@ -141,8 +143,8 @@ def evolved(problem: CycleProblem, start: Gait, seed: int, evaluations: int) -> 
     return best, -least
 
 
-def _costs(problem: CycleProblem, gaits: Sequence[Gait]) -> list[float]:
-    """Return what the population makes small."""
+def simulated_costs(problem: CycleProblem, gaits: Sequence[Gait]) -> list[float]:
+    """Return minus the scores of gaits, simulated (soft robots: from rest)."""
     each = [steady_gaits(robot, gaits, problem.model) for robot in problem.robots]
     costs = []
     for gait, orbits in zip(gaits, zip(*each)):

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from srs_opt.gait import Gait, published_wave
+from srs_opt.gait import Gait
 from srs_opt.gait_opt.collocation.problem import CycleProblem
+from srs_opt.gait_opt.robust import published_orbit
 from srs_opt.gait_opt.score import transport_cost
 from srs_opt.gait_opt.search import Found
-from srs_opt.orbit.steady import steady_gait
+from srs_opt.gait_opt.softness import STIFFNESSES_N_M2, robust_beside, speeds_at_stiffness
 
 _PRICES_TOLD = 4  # the dearest limits; the JSON has all
 _NOTHING_BEYOND = 0.5  # % of speed that rounding and the search's tolerance explain
@@ -39,17 +40,14 @@ def switches(gait: Gait) -> list[dict[str, Any]]:
 
 def baseline(problem: CycleProblem) -> dict[str, Any]:
     """Return the published gait's motion at the upper limits of frequency and pressure."""
-    robot, limits = problem.robots[0], problem.limits
-    frequency, pressure = limits.frequency_hz[1], limits.pressure_kpa[1]
-    gait = published_wave(robot, frequency, pressure).gait()
-    orbit = steady_gait(robot, gait, problem.model)
+    orbit = published_orbit(problem, problem.robots[0])
     return {
         "speed_m_s": orbit.speed_m_s,
         "turn_rate_rad_s": orbit.turn_rate_rad_s,
-        "cost_of_transport": transport_cost(problem, gait, 0, orbit),
+        "cost_of_transport": transport_cost(problem, orbit.gait, 0, orbit),
         "envelope_m": list(orbit.envelope_m),
-        "frequency_hz": frequency,
-        "pressure_kpa": pressure,
+        "frequency_hz": orbit.gait.frequency_hz,
+        "pressure_kpa": orbit.gait.pressure_kpa,
     }
 
 
@@ -69,8 +67,9 @@ def record(problem: CycleProblem, found: Found, solve_s: float, compile_s: float
         "phase_rad": None if wave is None else wave[0],
         "offset": None if wave is None else wave[1],
         "switches": switches(gait),
-        "robots": [r.record() for r in found.certificate.robots],
+        "robots": _robots(problem, found),
         "worst_robot": found.certificate.worst_robot.name,
+        **soft_speeds(problem, gait),
         "baseline": baseline(problem),
         "certificate": found.certificate.record(),
         "starts": len(found.merits),
@@ -78,9 +77,38 @@ def record(problem: CycleProblem, found: Found, solve_s: float, compile_s: float
         "populations": found.populations,
         "limits": [price.record() for price in found.prices],
         "iterations": found.iterations,
+        "from_rest": None if found.from_rest is None else found.from_rest.record(),
         "interrupted": found.interrupted,
         "solve_s": solve_s,
         "compile_s": compile_s,
+    }
+
+
+def _robots(problem: CycleProblem, found: Found) -> list[dict[str, Any]]:
+    """Return what the certificate says of every robot, with its published gait's speed beside it."""
+    return [
+        {**own.record(), "published_m_s": published_orbit(problem, robot).speed_m_s}
+        for robot, own in zip(problem.robots, found.certificate.robots)
+    ]
+
+
+def soft_speeds(problem: CycleProblem, gait: Gait) -> dict[str, Any]:
+    """Return the speeds that a rigid robot's gait would have if its segments had a stiffness.
+
+    Beside them those of the robust gait, for straight gaits of robots with as many segments; both are empty
+    for robots that have a stiffness.
+    """
+    robot, goal = problem.robots[0], problem.goal
+    beside = robust_beside(robot, problem.limits) if goal.only_fast else None
+    gaits = [gait] if beside is None else [gait, beside]
+    own, *robust = speeds_at_stiffness(robot, gaits)
+
+    def listed(speeds: list[float | None]) -> list[dict[str, float | None]]:
+        return [{"ei_n_m2": ei, "speed_m_s": speed} for ei, speed in zip(STIFFNESSES_N_M2, speeds)]
+
+    return {
+        "speed_at_stiffness": listed(own),
+        "robust_speed_at_stiffness": [entry for speeds in robust for entry in listed(speeds)],
     }
 
 
@@ -106,7 +134,9 @@ def summary(answer: dict[str, Any]) -> str:
         *(f"  {price['words']}" for price in answer["limits"][:_PRICES_TOLD]),
         *_freed(answer.get("free")),
         *_scattered(answer),
-        *_worst(answer),
+        *_each_robot(answer),
+        *_from_rest(answer),
+        *_if_soft(answer),
     ]
     lines += [f"  {failure}" for failure in certificate["failures"]]
     if answer["interrupted"]:
@@ -120,17 +150,47 @@ def _others(certificate: dict[str, Any]) -> list[str]:
     return [f"  from rest; begun while rolling this gait can also run at {speeds} m/s"] if speeds else []
 
 
-def _worst(answer: dict[str, Any]) -> list[str]:
-    """Say which of several robots serves the goal worst, and how."""
-    robots = answer["robots"]
-    if len(robots) < 2:
+def _each_robot(answer: dict[str, Any]) -> list[str]:
+    """Say what several robots make of the gait, the worst marked."""
+    if len(answer["robots"]) == 1:
         return []
-    worst = next(r for r in robots if r["name"] == answer["worst_robot"])
-    radius = "straight" if worst["radius_m"] is None else f"radius {worst['radius_m']:+.3f} m"
     return [
-        f"  worst of {len(robots)} robots: '{worst['name']}', {worst['speed_m_s']:.4f} m/s, {radius}, "
-        f"band {worst['band_m']:.4f} m"
+        f"  {r['name']}: {r['speed_m_s']:.4f} m/s, {r['speed_m_s'] / r['published_m_s']:.2f} times the "
+        f"published gait{' (the worst)' if r['name'] == answer['worst_robot'] else ''}"
+        for r in answer["robots"]
     ]
+
+
+def _from_rest(answer: dict[str, Any]) -> list[str]:
+    """Say that derivatives did not find the gait alone, where a search by simulation followed them."""
+    search = answer["from_rest"]
+    if search is None:
+        return []
+    before, after = search["merit_before"], search["merit_after"]
+    return [
+        "  collocation led to orbits that a standing start does not reach; "
+        f"{search['evaluations']} gaits simulated from rest (CMA-ES): merit {before:.4f} to {after:.4f}"
+    ]
+
+
+def _if_soft(answer: dict[str, Any]) -> list[str]:
+    """Say what a rigid robot's gait, and the robust gait, would make if the segments yielded."""
+
+    def words(entries: list[dict[str, Any]]) -> str:
+        return ", ".join(
+            "no steady motion" if e["speed_m_s"] is None else f"{e['speed_m_s']:.3f}" for e in entries
+        )
+
+    own, robust = answer["speed_at_stiffness"], answer["robust_speed_at_stiffness"]
+    if not own:
+        return []
+    stiffnesses = ", ".join(f"{e['ei_n_m2']:g}" for e in own)
+    lines = [f"  rigid actuators assumed: at {stiffnesses} N m^2 this gait makes {words(own)} m/s"]
+    if robust:
+        lines += [
+            f"  the robust gait {words(robust)} m/s: for segments of unknown stiffness (--stiffness EI...)"
+        ]
+    return lines
 
 
 def _scattered(answer: dict[str, Any]) -> list[str]:

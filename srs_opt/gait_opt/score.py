@@ -23,7 +23,7 @@ _LEAST_SCALE = 0.01
 
 @dataclass(frozen=True)
 class Score:
-    """Merit of the worst robot (as the program has it) and how far the wishes are missed (no unit)."""
+    """Worst robot's weighted merit (as the program has it) and how far the wishes are missed (no unit)."""
 
     merit: float
     miss: float
@@ -51,7 +51,9 @@ def robot_scores(problem: CycleProblem, gait: Gait, orbits: tuple[Orbit, ...]) -
     for r, orbit in enumerate(orbits):
         merit, rows = evaluated(problem, problem.goal.aim, gait, r, orbit)
         own = sum(over for _, over in broken_constraints(problem, rows))
-        found.append(Score(merit, _miss(problem.goal, orbit) + _limits_miss(problem, orbit) + own))
+        found.append(
+            Score(problem.weight(r) * merit, _miss(problem.goal, orbit) + _limits_miss(problem, orbit) + own)
+        )
     return tuple(found)
 
 

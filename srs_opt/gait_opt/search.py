@@ -15,6 +15,7 @@ from srs_opt.gait_opt.aim import within
 from srs_opt.gait_opt.certificate import Certificate
 from srs_opt.gait_opt.collocation.problem import CycleProblem
 from srs_opt.gait_opt.finish import topped
+from srs_opt.gait_opt.from_rest import FromRest, misled, search_from_rest
 from srs_opt.gait_opt.goal import Goal
 from srs_opt.gait_opt.ladder import Climb, Rung, Step, climb, ladder, orbits_of
 from srs_opt.gait_opt.population import populations
@@ -71,6 +72,8 @@ class Found:
         Whether Ctrl-C ended the search early.
     prices : tuple of Price
         What the limits that are active at the optimum cost.
+    from_rest : FromRest, optional
+        The search by simulation from rest that followed the climbs, where collocation was misled.
     """
 
     gait: Gait
@@ -83,6 +86,7 @@ class Found:
     seconds: float
     interrupted: bool
     prices: tuple[Price, ...] = ()
+    from_rest: FromRest | None = None
 
 
 def search(
@@ -142,13 +146,20 @@ def search(
         for k, top in carried.items():
             climbs[k] = replace(top, steps=(*climbs[k].steps, *top.steps))
     evolved: list[Climb] = []
-    if not interrupted and warm is None and problem.intervals == 1 and (_rugged(problem) or _scatter(climbs)):
+    whole = warm is None and problem.intervals == 1
+    astray = whole and misled([step for c in climbs.values() for step in c.steps])
+    if not interrupted and whole and (_rugged(problem) or (_scatter(climbs) and not astray)):
         evolved, interrupted = _evolved(problem, climbs, starts, seed, say, where)
     if evolved and _rugged(problem):  # the starts were not searched
         climbs = {}
     climbs |= {len(candidates) + k: found for k, found in enumerate(evolved)}
     best = max(climbs, key=lambda k: climbs[k].score.total)
     reached = climbs[best].gait
+    settled: FromRest | None = None
+    if astray and not interrupted:
+        say("collocated orbits are not those reached from rest: a search by simulation from rest")
+        settled = search_from_rest(problem, reached, seed)
+        reached, interrupted = settled.gait, settled.interrupted
     exact, certificate, orbits = topped(problem, reached, reach, _reporter(say, best, len(candidates)))
     if warm is not None and not certificate.passed and not interrupted:
         say(f"the earlier gait leads to none that holds ({certificate.failures[0]}): the whole search")
@@ -164,6 +175,7 @@ def search(
         time.perf_counter() - begun,
         interrupted,
         exact.prices,
+        settled,
     )
 
 

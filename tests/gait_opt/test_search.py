@@ -21,7 +21,7 @@ from srs_opt.gait_opt.goal import Goal, Limits, air_work_j, chamber_volume_m3
 from srs_opt.gait_opt.ladder import Rung, climb
 from srs_opt.gait_opt.population import evolved
 from srs_opt.gait_opt.reach import refuse_contradictions
-from srs_opt.gait_opt.report import wave_parameters
+from srs_opt.gait_opt.report import summary, wave_parameters
 from srs_opt.gait_opt.search import Where, search
 from srs_opt.orbit.steady import integrator, steady_gait
 from srs_opt.robot import wpi_srs
@@ -57,6 +57,18 @@ def test_fastest_gait_holds_up_in_a_simulation_from_rest(fastest):
     late = np.searchsorted(path.time_s, [20 * gait.period_s - 1e-9, 30 * gait.period_s - 1e-9])
     travelled = np.hypot(*(path.pose[late[1]] - path.pose[late[0]])[:2])
     assert travelled / (10 * gait.period_s) == pytest.approx(answer["speed_m_s"], rel=2e-3)
+
+
+def test_a_rigid_robots_answer_says_what_softness_costs(fastest):
+    """Rigid optimum: 0.53, 0.41, 0.15 m/s at 0.02, 0.005, 0.002 N m^2 by another program."""
+    answer, _ = fastest
+    speeds = {s["ei_n_m2"]: s["speed_m_s"] for s in answer["speed_at_stiffness"]}
+    robust = {s["ei_n_m2"]: s["speed_m_s"] for s in answer["robust_speed_at_stiffness"]}
+    assert list(speeds) == list(robust) == [0.02, 0.005, 0.002]
+    assert answer["speed_m_s"] > speeds[0.02] > speeds[0.005] > speeds[0.002]
+    assert speeds[0.02] == pytest.approx(0.53, rel=0.05)
+    assert robust[0.005] > 0.48 > 1.1 * speeds[0.005]
+    assert "rigid actuators assumed" in summary(answer)
 
 
 def test_answer_is_what_the_interface_says(fastest):

@@ -7,12 +7,16 @@ import pytest
 from test_collocation import ENDS, derivative_errors
 
 from srs_opt.gait import Wave, published_wave
+from srs_opt.gait_opt import from_rest
 from srs_opt.gait_opt.collocation.guess import switches_of, unknowns_from_orbits
 from srs_opt.gait_opt.collocation.layout import Mesh
 from srs_opt.gait_opt.collocation.phases import phase_cuts, phase_times, switch_order
 from srs_opt.gait_opt.collocation.problem import CycleProblem
 from srs_opt.gait_opt.goal import Goal, Limits
-from srs_opt.gait_opt.ladder import Rung, climb
+from srs_opt.gait_opt.ladder import Rung, Step, climb, orbits_of
+from srs_opt.gait_opt.robust import of_stiffness, relative, stiffness_interval
+from srs_opt.gait_opt.score import score
+from srs_opt.gait_opt.softness import robust_gait
 from srs_opt.orbit.steady import steady_gait
 from srs_opt.robot import wpi_srs
 
@@ -70,3 +74,60 @@ def test_optimum_of_a_soft_body_from_the_published_gait():
     lags = np.diff([on for ((on, _),) in found.gait.intervals]) / found.gait.period_s % 1.0
     tail, _, head = -2 * np.pi * (lags - 1)
     assert tail > 1.0 > 0.75 > head  # softer bodies: longer at the tail, shorter at the head
+
+
+STIFFNESSES = (0.002, 0.005, 0.02)
+
+
+def test_packaged_robust_gait_runs_twice_as_fast_as_the_published_one_whatever_the_stiffness():
+    """Another program knows a gait with 0.470, 0.486 and 0.474 m/s: 1.97 times the published one."""
+    robots = [of_stiffness(SOFT, ei) for ei in STIFFNESSES]
+    speeds = np.array([steady_gait(robot, robust_gait()).speed_m_s for robot in robots])
+    published = [steady_gait(r, published_wave(r, 2.0, 55.0).gait()).speed_m_s for r in robots]
+    assert (speeds > [0.470, 0.486, 0.474]).all()
+    assert (speeds / published).min() > 1.97
+
+
+def test_relative_merit_is_that_of_the_robot_slowest_beside_its_published_gait():
+    gait = Wave.uniform(4, 2.0, 41.0, 0.9).gait()
+    case = CycleProblem(tuple(of_stiffness(SOFT, ei) for ei in (0.005, 0.02)), "compliant", Goal(), Limits())
+    orbits = orbits_of(case, gait)
+    speeds = [o.speed_m_s for o in orbits]  # 0.404 and 0.520 m/s, published 0.246 and 0.233
+    assert score(case, gait, orbits).merit == pytest.approx(min(speeds))
+    weighted = relative(case)
+    assert weighted.weights == pytest.approx((1.0, 0.246 / 0.233), rel=0.01)
+    assert score(weighted, gait, orbits).merit == pytest.approx(speeds[0])
+    slower = (replace(orbits[0], motion=replace(orbits[0].motion, speed_m_s=0.5)), orbits[1])
+    other = replace(weighted, weights=(1.0, 0.8))
+    assert score(other, gait, slower).merit == pytest.approx(0.8 * speeds[1])
+
+
+def test_a_stiffness_known_with_a_deviation_stands_for_its_interval():
+    robots = stiffness_interval(SOFT.with_values(relative_sd={"bending_stiffness_n_m2": 0.2}))
+    assert [r.bending_stiffness_n_m2 for r in robots] == pytest.approx(
+        [0.005, 0.005 * np.exp(-0.4), 0.005 * np.exp(0.4)]
+    )
+    assert stiffness_interval(SOFT) == (SOFT,)
+    assert stiffness_interval(wpi_srs()) == (wpi_srs(),)
+
+
+def test_search_from_rest_gains_on_ticks_inside_the_limits(monkeypatch):
+    monkeypatch.setattr(from_rest, "GENERATIONS", 4)
+    start = Wave(1.99, 46.0, (0.0, 1.2, 2.15, 2.75), (0.0,) * 4).gait()
+    case = problem(SOFT.with_values(bending_stiffness_n_m2=0.002))
+    found = from_rest.search_from_rest(case, start, seed=3)
+    assert found.evaluations == 1 + 4 * from_rest.MEMBERS
+    assert found.after > found.before + 0.05
+    assert score(case, found.gait, orbits_of(case, found.gait)).total == pytest.approx(found.after)
+    assert 1.0 <= found.gait.frequency_hz <= 2.0 + 1e-9
+    assert 41.0 <= found.gait.pressure_kpa <= 55.0
+    ticks = np.array([t for pairs in found.gait.intervals for pair in pairs for t in pair]) / 0.001
+    assert ticks == pytest.approx(np.round(ticks), abs=1e-6)
+    again = from_rest.search_from_rest(case, start, seed=3)
+    assert again.gait == found.gait
+
+
+def test_orbits_that_rest_does_not_reach_are_noticed():
+    step = Step(Rung(0.002, 80, 0.1), 0.5, 0.5, 10, astray=0.01)
+    assert not from_rest.misled([step])
+    assert from_rest.misled([step, replace(step, astray=0.2)])

@@ -21,7 +21,7 @@ from srs_opt.gait_opt.objectives.cycle import SAMPLES
 from srs_opt.gait_opt.objectives.objective import Formulas, Objective, formulas
 from srs_opt.model.registry import build
 
-GOAL_NUMBERS = ("min_dwell_s", "radius_m", "envelope_m", "chamber_volume_m3", "merit_unit")
+GOAL_NUMBERS = ("min_dwell_s", "radius_m", "envelope_m", "chamber_volume_m3")
 _WITHIN = 0.75  # share of the tolerated miss of a radius that robots other than the first may use
 _HAT = 0.01  # half width, in cycles, over which switches are spread where formulas see the curvature
 
@@ -64,13 +64,13 @@ def goal_rows(layout: Layout, kind: GoalKind, times: Times | None = None) -> Goa
     """Return the rows of all robots.
 
     The head is what all robots share, then five unknowns per robot; the numbers are `GOAL_NUMBERS`, then the
-    weight of every robot.
+    weight of every robot and the unit of its merit.
     """
     robots = len(layout.kinds)
     shared = ca.SX.sym("shared", layout.shared)
     own = [ca.SX.sym(f"own{r}", len(ROBOT_UNKNOWNS)) for r in range(robots)]
     number = {name: ca.SX.sym(name) for name in GOAL_NUMBERS}
-    weights = ca.SX.sym("weight_n", robots)
+    weights, units = ca.SX.sym("weight_n", robots), ca.SX.sym("merit_unit", robots)
     parameters = [
         ca.SX.sym(f"p{r}", build(k.structure)[0].vector.numel()) for r, k in enumerate(layout.kinds)
     ]
@@ -101,7 +101,7 @@ def goal_rows(layout: Layout, kind: GoalKind, times: Times | None = None) -> Goa
                 not_negative("radius", speed - (1 - _WITHIN * TURN_ERROR) * arc)
                 not_negative("radius", (1 + _WITHIN * TURN_ERROR) * arc - speed)
         merit, rows = _formulas_of(aim, layout.kinds[r], shared, u, number, weights[r], parameters[r])
-        not_negative("merit", merit / number["merit_unit"] - shared[layout.merit])
+        not_negative("merit", merit / units[r] - shared[layout.merit])
         found += [
             (name, rows[j], low, high)
             for j, (name, low, high) in enumerate(zip(aim.names, aim.low, aim.high))
@@ -112,7 +112,7 @@ def goal_rows(layout: Layout, kind: GoalKind, times: Times | None = None) -> Goa
     values = [value for _, value, _, _ in found]
     function = ca.Function(
         "goal",
-        [head, ca.vertcat(*number.values(), weights), ca.vertcat(*parameters)],
+        [head, ca.vertcat(*number.values(), weights, units), ca.vertcat(*parameters)],
         [ca.vertcat(*values)],
     )
     sizes = [value.numel() for value in values]

@@ -41,6 +41,8 @@ class CycleProblem:
     relaxed : bool
         Valves may take any value in [-1, 1], on a grid of the mesh's elements.
     solver : Solver
+    weights : tuple of float
+        By which every robot's merit is multiplied before they are compared; empty: all one.
     """
 
     robots: tuple[Robot, ...]
@@ -50,6 +52,11 @@ class CycleProblem:
     intervals: int = 1
     relaxed: bool = False
     solver: Solver = IPOPT
+    weights: tuple[float, ...] = ()
+
+    def weight(self, robot: int) -> float:
+        """Return the factor of a robot's merit."""
+        return self.weights[robot] if self.weights else 1.0
 
     @property
     def formulas(self) -> Formulas:
@@ -101,8 +108,8 @@ class CycleProblem:
             goal.radius_m or 1.0,
             goal.envelope_m or 1.0,
             limits.chamber_volume_m3 or 0.0,
-            merit_unit,
             *(weight_n(robot) for robot in self.robots),
+            *(merit_unit / self.weight(r) for r in range(len(self.robots))),
         ]
         if p.times is None:
             place = np.stack([mesh.points(), np.repeat(np.diff(mesh.edges), 3)], axis=1).ravel()

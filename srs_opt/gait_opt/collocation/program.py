@@ -88,7 +88,7 @@ class Program:
     def _build(self) -> None:
         layout = self.layout
         z = ca.MX.sym("z", layout.size)
-        self.parameter_sizes = [2 * layout.points, len(GOAL_NUMBERS) + len(layout.kinds), 1]
+        self.parameter_sizes = [2 * layout.points, len(GOAL_NUMBERS) + 2 * len(layout.kinds), 1]
         for kind in layout.kinds:
             self.parameter_sizes += [
                 build(kind.structure)[0].vector.numel(), kind.states, kind.switches * layout.points

@@ -1,0 +1,62 @@
+"""Gaits for bodies of unknown stiffness: several robots in one problem, each beside its published gait."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from srs_opt.errors import NoAnswerError
+from srs_opt.gait import published_wave
+from srs_opt.gait_opt.collocation.problem import CycleProblem
+from srs_opt.orbit.steady import Orbit, steady_gait
+from srs_opt.robot import Robot
+
+INTERVAL_SD = 2.0  # standard deviations to either side that a stiffness known with one stands for
+LEAST_SD = 0.02  # speeds within 4 % of a stiffness hardly differ: then one body is enough
+_LEAST_M_S = 1e-3  # published speed below which nothing can be said relative to it
+
+
+def of_stiffness(robot: Robot, ei_n_m2: float) -> Robot:
+    """Return the robot with another bending stiffness, which its name says."""
+    return robot.with_values(bending_stiffness_n_m2=ei_n_m2, name=f"{robot.name}, EI {ei_n_m2:g} N m^2")
+
+
+def stiffness_interval(robot: Robot) -> tuple[Robot, ...]:
+    """Return the robot with its own stiffness and with those at the ends of what it may be.
+
+    These are two standard deviations of its logarithm away (`Robot.relative_sd`); the robot alone where the
+    file has no deviation, or one below `LEAST_SD`.
+    """
+    ei, sd = robot.bending_stiffness_n_m2, robot.relative_sd.get("bending_stiffness_n_m2", 0.0)
+    if ei is None or sd < LEAST_SD:
+        return (robot,)
+    reach = math.exp(INTERVAL_SD * sd)
+    return robot, of_stiffness(robot, ei / reach), of_stiffness(robot, ei * reach)
+
+
+def published_orbit(problem: CycleProblem, robot: Robot) -> Orbit:
+    """Return the published gait's motion at the upper limits of frequency and pressure."""
+    limits = problem.limits
+    gait = published_wave(robot, limits.frequency_hz[1], limits.pressure_kpa[1]).gait()
+    return steady_gait(robot, gait, problem.model)
+
+
+def relative(problem: CycleProblem) -> CycleProblem:
+    """Return the problem in which a robot's merit counts relative to its published gait's speed.
+
+    The nominal robot's merit stays as it is.
+
+    Raises
+    ------
+    NoAnswerError
+        If the published gait hardly moves one of them.
+    """
+    speeds = []
+    for robot in problem.robots:
+        speeds.append(published_orbit(problem, robot).speed_m_s)
+        if speeds[-1] < _LEAST_M_S:
+            raise NoAnswerError(
+                f"the published gait makes {speeds[-1]:.4f} m/s on robot '{robot.name}', nothing to compare "
+                "with: use --worst absolute"
+            )
+    return replace(problem, weights=tuple(speeds[0] / speed for speed in speeds))
