@@ -1,0 +1,109 @@
+"""Documented commands with other compiler flags: an answer that hangs on rounding shows here."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from benchmarks.section import Section
+
+FLAGS = {"-O0": "-O0", "no fused multiply-add": "-ffp-contract=off", "interpreted": None}
+QUICK = (
+    "srs_opt.simulate --duration 4",
+    "srs_opt.gait_map --frequency 1 2 3 --pressure 41 55 2 --offset 0 0.4 --jobs 1",
+)
+LONG = (
+    *QUICK,
+    "srs_opt.gait_opt --objective speed --jobs 1",
+    "srs_opt.gait_opt --objective turn --jobs 1",
+    "planners.plan mazes/first.yaml --execute",
+)
+NOT_ANSWERS = (
+    "second",
+    "wall",
+    "compile",
+    "time",
+    "file",
+    "iteration",
+    "wrote",
+    "evaluation",
+)  # parts of keys
+WORTH_TELLING = 5e-3  # relative: what the documentation's digits show
+ROOT = Path(__file__).parent.parent
+
+
+def run(quick: bool) -> Section:
+    rows = []
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch)
+        for command in QUICK if quick else LONG:
+            plain = _answer(command, folder, {})
+            for name, flag in FLAGS.items():
+                other = _answer(command, folder, _environment(folder, name, flag))
+                where, difference = _largest_difference(plain, other)
+                told = "NO" if difference > WORTH_TELLING else "yes"
+                rows.append([command, name, f"{difference:.1e}", where, told])
+    return Section(
+        "Other compiler flags",
+        ["command", "flags", "largest relative difference", "of", "same digits"],
+        rows,
+        notes=[
+            "Against the usual flags. A difference is relative to the value or, near zero, to 1e-3; "
+            "infinite where the answers have another form."
+        ],
+    )
+
+
+def _environment(folder: Path, name: str, flag: str | None) -> dict[str, str]:
+    """Return the environment in which models are compiled with one more flag, or not at all."""
+    if flag is None:
+        return {"SRS_OPT_CC": "none"}
+    script = folder / f"cc{flag}"
+    script.write_text(f'#!/bin/sh\nexec cc "$@" {flag}\n', encoding="utf-8")  # the last flag counts
+    script.chmod(0o755)
+    return {"SRS_OPT_CC": str(script), "SRS_OPT_CACHE": str(folder / f"cache {name}")}
+
+
+def _answer(command: str, folder: Path, changes: dict[str, str]) -> Any:
+    given = [sys.executable, "-m", *command.split(), "--json", "--quiet", "--out", str(folder / "out")]
+    environment = {**os.environ, **changes}
+    done = subprocess.run(given, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
+    return json.loads(done.stdout)
+
+
+def _largest_difference(one: Any, other: Any) -> tuple[str, float]:
+    """Return where two answers differ most, and by how much."""
+    a, b = dict(_values(one)), dict(_values(other))
+    if a.keys() != b.keys():
+        return "keys", float("inf")
+    found = {key: _difference(a[key], b[key]) for key in a}
+    key = max(found, key=lambda k: found[k])
+    return key, found[key]
+
+
+def _difference(a: Any, b: Any) -> float:
+    if isinstance(a, float) and isinstance(b, float):
+        return abs(a - b) / max(abs(a), 1e-3)
+    return 0.0 if a == b else float("inf")
+
+
+def _values(record: Any, key: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield (key, number or word) of everything in a JSON answer that is not a time, a count or a file."""
+    if any(word in key.rsplit(".", 1)[-1] for word in NOT_ANSWERS):
+        return
+    if isinstance(record, dict):
+        for name, value in record.items():
+            yield from _values(value, f"{key}.{name}" if key else name)
+    elif isinstance(record, list):
+        for k, value in enumerate(record):
+            yield from _values(value, f"{key}[{k}]")
+    elif isinstance(record, (int, float)) and not isinstance(record, bool):
+        yield key, float(record)
+    elif not isinstance(record, str) or "/" not in record:
+        yield key, record
