@@ -11,6 +11,7 @@ import numpy as np
 from srs_opt.calibrate.coordinates import SCATTER_SD, Coordinate, base_coordinates
 from srs_opt.calibrate.experiment import Experiment, Point
 from srs_opt.calibrate.fit import fit, start_point
+from srs_opt.calibrate.forms import form_of_entry
 from srs_opt.calibrate.gram import TrialGram, solve
 from srs_opt.calibrate.model import Model
 from srs_opt.calibrate.objective import priors, sum_eliminated
@@ -18,8 +19,9 @@ from srs_opt.calibrate.result import Calibration, calibration
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Wave
 from srs_opt.measurement.records import DataSet, MapRow, Trial
+from srs_opt.model.effects import all_effects
 from srs_opt.orbit.sensitivity import sensitivity
-from srs_opt.orbit.steady import Orbit, steady_gaits
+from srs_opt.orbit.steady import Orbit, integrator, steady_gaits
 from srs_opt.robot import Robot
 
 LEAST_SD = np.array([1e-4, 0.01])  # speed in m/s, path's curvature in 1/m
@@ -33,6 +35,8 @@ def fit_maps(
 ) -> Calibration:
     """Fit the robot's parameters to speed and path curvature of every row of maps.csv.
 
+    The robot's own effects are part of the model, and those with a deviation are fitted, unless they leave
+    steady gaits as they are (a camera's, the room's): these stay as the file says.
     Derivatives come from the steady gait's own solve. What scatters from run to run is friction and
     curvature per pressure, as the model says, and what the stated deviations hold beyond that. The result
     also says what tracks of the same gaits would have told.
@@ -42,7 +46,7 @@ def fit_maps(
     NoAnswerError
         If no gait of the maps has a steady state.
     """
-    base = base_coordinates(dataset.robot)
+    base = (*base_coordinates(dataset.robot), *_effects_seen(dataset.robot, report))
     found = fit(Maps(dataset, model, base), base, report=report, correlated=1.0)
     before, after = math.sqrt(found.start_misfit_ratio), math.sqrt(found.misfit_ratio)
     result = calibration(dataset.robot, found, before, after)
@@ -57,7 +61,7 @@ class Maps:
     dataset : DataSet
     model : {"complex", "simplified"}
     base : sequence of Coordinate
-        Robot parameters.
+        Robot parameters and parts of the robot's own effects.
     """
 
     def __init__(self, dataset: DataSet, model: str, base: Sequence[Coordinate]) -> None:
@@ -104,26 +108,75 @@ class Maps:
     def _paths(
         self, point: Point, coordinates: Sequence[Coordinate]
     ) -> dict[int, tuple[np.ndarray, np.ndarray]]:
-        changes = {n: getattr(self.robot, n) * math.exp(v) for n, v in point.values.items()}
-        robot = self.robot.with_values(**changes)
+        robot = robot_at(self.robot, point.values)
+        moves = [parameter_moves(self.robot, point.values, c, self.model) for c in coordinates]
         gaits = [_wave(robot, row).gait() for row in self.rows.values()]
         return {
-            k: path(robot, orbit, coordinates, self.model)
+            k: path(robot, orbit, moves, self.model)
             for k, orbit in zip(self.rows, steady_gaits(robot, gaits, self.model))
             if not isinstance(orbit, NoAnswerError)
         }
 
 
-def path(robot: Robot, orbit: Orbit, base: Sequence[Coordinate], model: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return speed (m/s) and curvature (1/m, + left) of a gait's path, and their slopes (2, K)."""
+def robot_at(robot: Robot, values: Mapping[str, float]) -> Robot:
+    """Return `robot` with its parameters and its own effects moved to a fit's coordinates."""
+    changes = {n: getattr(robot, n) * math.exp(v) for n, v in values.items() if "." not in n}
+    effects = []
+    for entry in robot.effects:
+        form = form_of_entry(entry)
+        start = form.values(entry)
+        effects.append({**entry, **form.entry({n: values.get(n, v) for n, v in start.items()})})
+    return robot.with_values(**changes, effects=effects)
+
+
+def parameter_moves(
+    robot: Robot, values: Mapping[str, float], coordinate: Coordinate, model: str
+) -> dict[str, float]:
+    """Return the derivatives of the model's parameters, by name, by one coordinate of a fit.
+
+    By central differences of the packing, which is smooth where an effect is present: their error is
+    second order in a ten-thousandth of the effect's typical size.
+    """
+    if not coordinate.effect:
+        name = coordinate.name
+        return {name: getattr(robot, name) * math.exp(values.get(name, 0.0))}
+    h = 1e-4 * coordinate.typical
+    here = values.get(coordinate.name, coordinate.start)
+    ends = []
+    for side in (1, -1):
+        run = integrator(robot_at(robot, {**values, coordinate.name: here + side * h}), model)
+        ends.append(run.pack(1.0, 1.0))
+    moved = (ends[0] - ends[1]) / (2 * h)
+    return {n: float(d) for n, d in zip(run.parameters.names, moved) if d}
+
+
+def path(
+    robot: Robot, orbit: Orbit, moves: Sequence[Mapping[str, float]], model: str
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return speed (m/s) and curvature (1/m, + left) of a gait's path, and their slopes (2, K).
+
+    `moves` holds what each of K coordinates does to the model's parameters (`parameter_moves`).
+    """
     forward = math.copysign(1.0, orbit.speed_m_s)
     speed, turn = abs(orbit.speed_m_s), orbit.turn_rate_rad_s
     by = sensitivity(robot, orbit, model).robot
-    slopes = np.empty((2, len(base)))
-    for k, coordinate in enumerate(base):
-        by_speed, by_turn = by[coordinate.name] * getattr(robot, coordinate.name)
+    slopes = np.empty((2, len(moves)))
+    for k, move in enumerate(moves):
+        by_speed, by_turn = sum((by[n] * d for n, d in move.items()), np.zeros(2))
         slopes[:, k] = forward * by_speed, (by_turn - turn / speed * forward * by_speed) / speed
     return np.array([speed, turn / speed]), slopes
+
+
+def _effects_seen(robot: Robot, report: Callable[[str], None] | None) -> list[Coordinate]:
+    """Return the free parts of the robot's effects that steady gaits show; tell of those that they do not."""
+    seen = []
+    for entry in robot.effects:
+        effect, free = all_effects()[entry["name"]], form_of_entry(entry).refitted(entry)
+        if effect.in_equations and not effect.knows_the_room:
+            seen += free
+        elif report:
+            report(f"effect {effect.name} stays as the robot file says: maps of steady gaits cannot show it")
+    return seen
 
 
 def _wave(robot: Robot, row: MapRow) -> Wave:
@@ -174,8 +227,10 @@ def _sd_with_tracks(
     experiment = Experiment(Model(dataset.robot, model), trials, dataset.marker_sd_m)
     total = sum_eliminated(experiment.grams(point, base)) * (len(dataset.maps) / len(rows))
     covariance = solve(total, range(len(base)), *priors(base, point)).covariance
+    size = {
+        c.name: 1.0 if c.effect else getattr(dataset.robot, c.name) * math.exp(point.values[c.name])
+        for c in base
+    }
     return {
-        c.name: getattr(dataset.robot, c.name) * math.exp(point.values[c.name]) * float(sd)
-        for c, sd in zip(base, np.sqrt(np.diag(covariance)))
-        if c.reported
+        c.name: size[c.name] * float(sd) for c, sd in zip(base, np.sqrt(np.diag(covariance))) if c.reported
     }
