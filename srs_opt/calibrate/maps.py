@@ -169,7 +169,7 @@ def path(
 
 def _effects_seen(robot: Robot, report: Callable[[str], None] | None) -> list[Coordinate]:
     """Return the free parts of the robot's effects that steady gaits show; tell of those that they do not."""
-    seen = []
+    seen: list[Coordinate] = []
     for entry in robot.effects:
         effect, free = all_effects()[entry["name"]], form_of_entry(entry).refitted(entry)
         if effect.in_equations and not effect.knows_the_room:
