@@ -13,7 +13,7 @@ from typing import Any
 
 from benchmarks.section import Section
 
-# Ways to round otherwise. The C library chooses sin, exp and so on, and OpenBLAS its kernels, by the processor.
+# Ways to round otherwise. By the processor the C library chooses sin, exp and so on, OpenBLAS its kernels.
 VARIANTS = ("another processor", "fused multiply-add", "interpreted")
 OLD_PROCESSOR = {"GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA,-FMA4", "OPENBLAS_CORETYPE": "Prescott"}
 FUSED = "-O2 -march=native -ffp-contract=fast"
