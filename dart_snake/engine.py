@@ -171,11 +171,9 @@ class Snake:
         row = self._snake.getPositions()
         return self._motion(row[None], np.array([self.time_s]), np.zeros(1, dtype=bool))
 
-    def centre_velocity(self) -> Array:
-        """Return the velocity of the centre of mass, (v_x, v_y), m/s."""
-        mass = np.array([link.mass_kg for link in self.body.links])
-        speeds = np.array([carrier.getLinearVelocity()[:2] for carrier in self._carriers])
-        return mass @ speeds / mass.sum()
+    def link_velocities(self) -> Array:
+        """Return the velocities of the links (N, 2), m/s."""
+        return np.array([carrier.getLinearVelocity()[:2] for carrier in self._carriers])
 
     def turn_rates(self) -> Array:
         """Return the turn rates of the links (N,), rad/s."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from srs_opt.command import (
@@ -70,7 +71,33 @@ def run(options: argparse.Namespace) -> Answer:
     robot = load_robot(options.robot)
     check_robot(robot)
     tolerance = Tolerance(options.tolerance, 1.5 * options.tolerance)
+    if Path(options.file).name in ("plan.json", "motion.json"):
+        return _motion(options, robot)
     return _gaits(options, robot, tolerance)
+
+
+def _motion(options: argparse.Namespace, robot: Robot) -> Answer:
+    import time
+
+    from srs_opt.files import write_json
+    from srs_opt.judge.figures import draw_replay
+    from srs_opt.judge.gaits import Settings
+    from srs_opt.judge.replay import load_motion, replay
+    from srs_opt.judge.walls import solid_region
+
+    motion = load_motion(options.file)
+    begun = time.perf_counter()
+    seen = replay(robot, motion, Settings(options.step))
+    answer = {
+        "drive": seen.to_record(),
+        "robot": robot.name,
+        "seconds": round(time.perf_counter() - begun, 3),
+    }
+    files = [
+        write_json(options.out / "judge.json", answer),
+        *draw_replay(seen, solid_region(motion["maze"]), robot.body_width_m, options.out / "judge"),
+    ]
+    return Answer(answer, seen.in_words(), seen.agrees, tuple(files))
 
 
 def _gaits(options: argparse.Namespace, robot: Robot, tolerance: Tolerance) -> Answer:

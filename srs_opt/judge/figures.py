@@ -1,18 +1,21 @@
-"""Picture of opinions: the engine's speeds and turn rates over ours, and the differences."""
+"""Pictures: the engine's speeds and turn rates over ours; its drive among the walls beside ours."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from srs_opt.figures import COLOURS, PAGE_IN, new_figure, save_figure, styled
+from srs_opt.figures import COLOURS, PAGE_IN, draw_body, fill_region, new_figure, save_figure, styled
 from srs_opt.judge.opinion import Opinion
+from srs_opt.judge.replay import Replay
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+BODIES = 16  # that are drawn along a drive
 
 
 @styled
@@ -62,3 +65,23 @@ def _panel(
     axes.axhline(0.0, color=COLOURS[6], linewidth=0.6)
     for mask, colour, marker in ((agrees, COLOURS[0], "o"), (~agrees, COLOURS[1], "x")):
         axes.plot(ours[mask], scale * (theirs - ours)[mask], marker, color=colour, markersize=3.5)
+
+
+@styled
+def draw_replay(seen: Replay, walls: Any, width_m: float, stem: Path) -> tuple[Path, Path]:
+    """Draw the engine's way and bodies among the walls, and our way; return the files."""
+    figure, axes = new_figure(1, 1, width_in=PAGE_IN, height_in=0.8 * PAGE_IN)
+    fill_region(axes, walls, color=COLOURS[7], alpha=0.8)
+    shown = np.linspace(0, len(seen.lines) - 1, BODIES).round().astype(int)
+    for k in shown:
+        draw_body(axes, seen.lines[k, :, 0], seen.lines[k, :, 1], width_m, color=COLOURS[5], alpha=0.5)
+    axes.plot(*seen.ours.T, color=COLOURS[6], linewidth=0.8, linestyle="--", label=f"ours ({seen.name})")
+    axes.plot(*seen.centre.T, color=COLOURS[1], linewidth=1.0, label="the engine")
+    if seen.first_contact_s is not None:
+        at = seen.centre[int(np.searchsorted(seen.time_s, seen.first_contact_s))]
+        axes.plot(*at, "x", color=COLOURS[3], label="first contact")
+    axes.set_aspect("equal")
+    axes.set_xlabel("x (m)")
+    axes.set_ylabel("y (m)")
+    figure.legend(loc="outside upper center", ncols=3)
+    return save_figure(figure, stem)

@@ -1,0 +1,251 @@
+"""A motion.json played in the engine: its valves, cycle after cycle, among its walls, without looking."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dart_snake.bending import Lags, respond
+from dart_snake.engine import Snake
+from srs_opt.document import read_json
+from srs_opt.errors import InputError
+from srs_opt.gait import Gait
+from srs_opt.judge.bodies import body_of, drive_of, pull_of, slope_of
+from srs_opt.judge.gaits import DEFAULT_SETTINGS, Settings
+from srs_opt.judge.walls import boxes_of, clearances, solid_region
+from srs_opt.robot import Robot
+
+Array = NDArray[np.float64]
+VERSION = 2  # of motion.json
+STAIR_S = 0.005  # of a changing pressure
+ROW_STEPS = 10  # steps from one look at the body to the next
+# How far the engine may be from our motion when it plays blind, over the way until then: small differences of
+# speed and turn rate add up.
+DRIFT_SHARE = 0.03
+LEAST_DRIFT_M = 0.01
+
+
+@dataclass(frozen=True)
+class Phases:
+    """Held valves, one after the other: durations (n,), valves (N-1, n), pressures and frequencies (n,)."""
+
+    duration_s: Array
+    valve: Array
+    pressure_kpa: Array
+    frequency_hz: Array
+
+
+@dataclass(frozen=True)
+class Replay:
+    """A run in the engine.
+
+    Attributes
+    ----------
+    name : str
+        planned or driven.
+    reached : bool
+        Whether the centre of mass came to the goal.
+    contacts : int
+        How often the body came to touch a wall.
+    first_contact_s : float or None
+    smallest_clearance_m : float
+    drift_m, way_m : float
+        How far the centre of mass is from where we have it, in the end or at the first contact; length of our
+        way until then.
+    time_s, centre, lines : arrays (n,), (n, 2), (n, points, 2)
+        The motion, body included.
+    ours : array (m, 2)
+        Our centre of mass.
+    """
+
+    name: str
+    reached: bool
+    contacts: int
+    first_contact_s: float | None
+    smallest_clearance_m: float
+    drift_m: float
+    way_m: float
+    time_s: Array
+    centre: Array
+    lines: Array
+    ours: Array
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the motions are together until the end, or until a wall that drift has led to is touched."""
+        return self.drift_m <= max(DRIFT_SHARE * self.way_m, LEAST_DRIFT_M)
+
+    def to_record(self) -> dict[str, Any]:
+        """Return the `drive` entry of judge.json."""
+        return {
+            "run": self.name,
+            "reached": self.reached,
+            "contacts": self.contacts,
+            "first_contact_s": self.first_contact_s,
+            "smallest_clearance_m": round(self.smallest_clearance_m, 6),
+            "drift_m": round(self.drift_m, 6),
+            "way_m": round(self.way_m, 6),
+            "duration_s": round(float(self.time_s[-1]), 4),
+            "agrees": self.agrees,
+        }
+
+    def in_words(self) -> str:
+        """Return what happened, in a line."""
+        touched = "no wall touched"
+        if self.contacts:
+            touched = f"walls touched {self.contacts} times, first after {self.first_contact_s:.1f} s"
+        goal = "goal reached" if self.reached else "goal not reached"
+        return (
+            f"{'agrees' if self.agrees else 'DISAGREES'}: the {self.name} cycles, played blind: {goal}, "
+            f"{touched}, smallest clearance {1e3 * self.smallest_clearance_m:.1f} mm; "
+            f"{1e3 * self.drift_m:.0f} mm "
+            f"from ours after {self.way_m:.2f} m"
+        )
+
+
+def load_motion(file: str) -> dict[str, Any]:
+    """Read motion.json, or the one beside a plan.json.
+
+    Raises
+    ------
+    InputError
+        If it is none.
+    """
+    path = Path(file)
+    if path.name == "plan.json":
+        plan = read_json(path, "a plan (JSON of plan)").value
+        if not isinstance(plan, dict) or plan.get("status") != "solved":
+            raise InputError(f"{file}: is no solved plan, so there is nothing to play")
+        path = path.with_name("motion.json")
+    document = read_json(path, "the motion of a plan (motion.json, which plan writes beside plan.json)")
+    record = document.value
+    needed = ("body_width_m", "maze", "gaits", "joining", "runs")
+    if not isinstance(record, dict) or any(key not in record for key in needed):
+        raise InputError(f"{path}: expected keys {', '.join(needed)}, as plan writes them")
+    if record.get("version") != VERSION:
+        found = record.get("version")
+        raise InputError(f"{path}: version: this program reads version {VERSION}, found {found!r}")
+    return record
+
+
+def replay(robot: Robot, motion: Mapping[str, Any], settings: Settings = DEFAULT_SETTINGS) -> Replay:
+    """Play the last run of a motion (the drive, where it was driven) from rest at the maze's start.
+
+    Raises
+    ------
+    InputError
+        If the motion cannot be played by this robot.
+    """
+    run, maze = motion["runs"][-1], motion["maze"]
+    try:
+        phases = phases_of(motion, run)
+        start = tuple(float(v) for v in maze["start"])
+        ours = 1e-4 * np.array(run["centre"], dtype=float)
+    except (TypeError, KeyError, ValueError, IndexError) as error:
+        raise InputError(f"motion.json: its runs cannot be played ({json.dumps(str(error))})") from error
+    if phases.valve.shape[0] != robot.segments:
+        raise InputError(
+            f"motion.json: its gaits drive {phases.valve.shape[0]} segments, robot '{robot.name}' has "
+            f"{robot.segments}; name the robot with --robot"
+        )
+    duration = float(phases.duration_s.sum())
+    steps = math.ceil(duration / settings.step_s - 1e-9)
+    step_s = duration / steps
+    snake = Snake(
+        body_of(robot), (start[0], start[1], start[2]), step_s=step_s, pairs=settings.pairs,
+        walls=boxes_of(maze), slope=slope_of(robot), pull=pull_of(robot, room=True),
+    )  # fmt: skip
+    drive = drive_of(robot, phases.valve, phases.pressure_kpa, phases.frequency_hz)
+    times = np.asarray(np.arange(1, steps + 1) * step_s, dtype=np.float64)
+    tau = (robot.tau1_s, robot.tau2_s)
+    curvature, rate, _ = respond(Lags.rest(robot.segments), phases.duration_s, drive, tau, times)
+    seen = snake.play(curvature, rate, ROW_STEPS)
+    masses = np.array([link.mass_kg for link in snake.body.links])
+    centre = np.stack([seen.x_m @ masses, seen.y_m @ masses], axis=1) / masses.sum()
+    room = clearances(solid_region(maze), seen.line_m, robot.body_width_m)
+    at_s = np.linspace(0.0, duration, len(ours))
+    began = np.flatnonzero(np.diff(np.concatenate([[0], seen.touched.astype(int)])) > 0)
+    last = int(began[0]) if began.size else len(centre) - 1
+    there = np.array([np.interp(seen.time_s[last], at_s, ours[:, k]) for k in range(2)])
+    until = ours[at_s <= seen.time_s[last] + 1e-9]
+    return Replay(
+        run["name"],
+        bool(_in_goal(maze["goal"], centre).any()),
+        int(began.size),
+        float(seen.time_s[began[0]]) if began.size else None,
+        float(room.min()),
+        float(np.hypot(*(centre[last] - there))),
+        float(np.hypot(*np.diff(until, axis=0).T).sum()),
+        seen.time_s,
+        centre,
+        seen.line_m,
+        ours,
+    )
+
+
+def phases_of(motion: Mapping[str, Any], run: Mapping[str, Any]) -> Phases:
+    """Return what the valves do in a run: cycles until the next thing begins, halts, nothing in between."""
+    things: list[tuple[float, Phases]] = []
+    for gait, start_s, joining in run["cycles"]:
+        entry = motion["gaits"][gait] if joining is None else motion["joining"][joining]
+        things.append((float(start_s), _cycle(entry)))
+    for halt in run.get("halts", ()):
+        duration = np.array(halt["duration_s"], dtype=float)
+        valve = np.array(halt["valve"], dtype=float)
+        pressure = np.array(halt["pressure_kpa"], dtype=float)
+        things.append((float(halt["start_s"]), Phases(duration, valve, pressure, np.ones(duration.size))))
+    things.sort(key=lambda thing: thing[0])
+    ends = [*(start for start, _ in things[1:]), float(run["duration_s"])]
+    parts = [_until(phases, end - start) for (start, phases), end in zip(things, ends)]
+    return Phases(
+        np.concatenate([p.duration_s for p in parts]),
+        np.concatenate([p.valve for p in parts], axis=1),
+        np.concatenate([p.pressure_kpa for p in parts]),
+        np.concatenate([p.frequency_hz for p in parts]),
+    )
+
+
+def _cycle(entry: Mapping[str, Any]) -> Phases:
+    """Return the phases of one cycle, a change of pressure in stairs at its means."""
+    gait = Gait.of_record(dict(entry))
+    durations, _ = gait.phases()
+    edges = np.concatenate([[0.0], np.cumsum(durations)])
+    ramp_s = float(entry.get("ramp_s", 0.0))
+    if ramp_s > 0:
+        edges = np.union1d(edges, np.linspace(0.0, ramp_s, math.ceil(ramp_s / STAIR_S) + 1))
+        edges = edges[np.append(True, np.diff(edges) > 1e-9)]
+    middles = (edges[:-1] + edges[1:]) / 2
+    valve = np.stack([gait.valve(t) for t in middles], axis=1)
+    pressure = np.full(middles.size, gait.pressure_kpa)
+    if ramp_s > 0:
+        pressure = np.interp(middles, [0.0, ramp_s], [float(entry["from_kpa"]), gait.pressure_kpa])
+    return Phases(np.diff(edges), valve, pressure, np.full(middles.size, gait.frequency_hz))
+
+
+def _until(phases: Phases, end_s: float) -> Phases:
+    """Return phases cut off at an end, or vented until then."""
+    ends = np.cumsum(phases.duration_s)
+    keep = ends - phases.duration_s < end_s - 1e-9
+    duration = np.minimum(ends, end_s)[keep] - (ends - phases.duration_s)[keep]
+    valve, pressure, frequency = phases.valve[:, keep], phases.pressure_kpa[keep], phases.frequency_hz[keep]
+    if end_s > ends[-1] + 1e-9:
+        duration = np.append(duration, end_s - ends[-1])
+        valve = np.concatenate([valve, np.zeros((valve.shape[0], 1))], axis=1)
+        pressure, frequency = np.append(pressure, pressure[-1]), np.append(frequency, frequency[-1])
+    return Phases(duration, valve, pressure, frequency)
+
+
+def _in_goal(goal: Mapping[str, Any], centre: Array) -> NDArray[np.bool_]:
+    """Return whether each point lies in the goal's disc or boxes."""
+    boxes = goal.get("boxes") or []
+    if not boxes:
+        return np.hypot(centre[:, 0] - goal["x"], centre[:, 1] - goal["y"]) <= goal["radius"]
+    x, y = centre.T
+    return np.any([(x0 <= x) & (x <= x1) & (y0 <= y) & (y <= y1) for x0, y0, x1, y1 in boxes], axis=0)
