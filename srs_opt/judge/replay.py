@@ -79,7 +79,7 @@ class Replay:
 
     @property
     def agrees(self) -> bool:
-        """Whether the motions are together until the end, or until a wall that drift has led to is touched."""
+        """Whether the motions stay together until the end, or until drift has led to a wall."""
         return self.drift_m <= max(DRIFT_SHARE * self.way_m, LEAST_DRIFT_M)
 
     def to_record(self) -> dict[str, Any]:
