@@ -34,6 +34,11 @@ def build_parser() -> Parser:
     parser.add_argument(
         "--true-robot", type=Path, metavar="FILE", help="drive this robot instead (implies --execute)"
     )
+    parser.add_argument(
+        "--judge",
+        action="store_true",
+        help="also drive it closed-loop with another physics engine as the robot (extra 'judge')",
+    )
     parser.add_argument("--ros-path", type=Path, metavar="FILE", help="also write a nav_msgs/Path as YAML")
     parser.add_argument("--animate", type=Path, metavar="FILE", help="animation, .gif or (with ffmpeg) .mp4")
     return parser
@@ -124,12 +129,16 @@ def add_problem_options(parser: Parser) -> None:
 
 def run(options: argparse.Namespace) -> Answer:
     """Plan, certify, explain, drive, draw."""
+    from functools import partial
+
+    from planners.drive.engine_plant import drive_in_engine
     from planners.plan.inputs import problem_from
     from planners.plan.looks import looks
     from planners.plan.portfolio import Wish, solve
     from planners.plan.registry import planner_named
     from planners.view.animation_path import check_animation_path
     from srs_opt.files import write_json
+    from srs_opt.judge.bodies import check_judge
     from srs_opt.robot import load_robot
 
     if options.animate:
@@ -138,6 +147,8 @@ def run(options: argparse.Namespace) -> Answer:
         planner_named(options.planner)
     true_robot = load_robot(options.true_robot) if options.true_robot else None
     problem = problem_from(options)
+    if options.judge:
+        check_judge([true_robot or problem.robot])
     wish = Wish(options.planner, options.seed, options.time_limit, options.best)
     result = solve(problem, wish, lambda message: say(options, message))
     record = result.to_record(problem)
@@ -149,9 +160,14 @@ def run(options: argparse.Namespace) -> Answer:
         between = looks(problem, result.plan)
         record["looks"] = between.to_record()
         execution = _drive(options, problem, result, record, true_robot)
+        if options.judge:
+            say(options, "driving in the other engine")
+            told = partial(say, options)
+            record["judge"] = drive_in_engine(problem, result.plan, true_robot, told).to_record()
         files += _pictures(options, problem, result, execution)
     files.append(write_json(options.out / "plan.json", record))
     good = result.plan is not None and (execution is None or execution.reached)
+    good = good and record.get("judge", {}).get("agrees", True)
     words = _summary(record, None if result.plan is None else between.in_words())
     return Answer(record, words, good, tuple(files))
 
@@ -224,6 +240,12 @@ def _summary(record: dict[str, Any], between: str | None) -> str:
             f"driven: {execution['reason']}; {execution['duration_s']:.1f} s, "
             f"smallest clearance {1e3 * execution['smallest_clearance_m']:.1f} mm, "
             f"{execution['replans']} new plans on the way"
+        )
+    if judge := record.get("judge"):
+        lines.append(
+            f"judge: {'agrees' if judge['agrees'] else 'DISAGREES'}: in the other engine {judge['reason']}; "
+            f"{judge['duration_s']:.1f} s, {judge['contacts']} contacts, smallest clearance "
+            f"{1e3 * judge['smallest_clearance_m']:.1f} mm, {judge['replans']} new plans on the way"
         )
     return "\n".join(lines)
 

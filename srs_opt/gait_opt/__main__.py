@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from srs_opt.command import (
     Answer,
@@ -86,6 +86,11 @@ def build_parser() -> Parser:
         "wanted), or the slowest",
     )  # fmt: skip
     how.add_argument("--starts", type=positive_int, default=4, metavar="N", help="starting gaits (default 4)")
+    how.add_argument(
+        "--judge",
+        action="store_true",
+        help="ask another physics engine about the result (extra 'judge'); the certificate carries its word",
+    )
     how.add_argument("--warm", metavar="FILE", help="start from the gait of an earlier run (its gait.json)")
     return parser
 
@@ -216,6 +221,8 @@ def run(options: argparse.Namespace) -> Answer:
     from srs_opt.gait_opt.free import search_free
     from srs_opt.gait_opt.report import record, summary
     from srs_opt.gait_opt.search import Where, search
+    from srs_opt.judge.bodies import check_judge
+    from srs_opt.judge.opinion import opinion_on
     from srs_opt.model.parameters import room_effects
     from srs_opt.simulate import compiled
 
@@ -226,6 +233,8 @@ def run(options: argparse.Namespace) -> Answer:
             f"note: robot '{problem.robots[0].name}' gives its stiffness with a deviation: one gait for two "
             "standard deviations to either side; --stiffness EI for one value alone",
         )
+    if options.judge:
+        check_judge(problem.robots)
     for robot in problem.robots:
         if effects := room_effects(robot):
             say(
@@ -246,12 +255,19 @@ def run(options: argparse.Namespace) -> Answer:
         shutil.rmtree(unfinished, ignore_errors=True)
     compile_s = compiled.compile_seconds - compiled_before
     answer = {**record(problem, found, time.perf_counter() - begun - compile_s, compile_s), **extra}
+    good = found.certificate.passed
+    if options.judge:
+        say(options, "asking the other engine")
+        named = [(robot, robot.name, found.gait) for robot in problem.robots]
+        opinions = [opinion_on(*each, problem.model) for each in named]
+        answer["certificate"]["judge"] = [opinion.to_record() for opinion in opinions]
+        good = good and all(opinion.agrees for opinion in opinions)
     files = [
         write_json(options.out / "gait.json", answer),
         *draw_gait(problem.robots[0], problem.model, found.orbits[0], options.out / "gait"),
         *draw_convergence(found, options.out / "convergence"),
     ]
-    return Answer(answer, summary(answer), found.certificate.passed, tuple(files))
+    return Answer(answer, summary(answer), good, tuple(files))
 
 
 def _run_table(options: argparse.Namespace) -> Answer:
@@ -271,10 +287,14 @@ def _run_table(options: argparse.Namespace) -> Answer:
     from srs_opt.gait_opt.figures import draw_pareto
     from srs_opt.gait_opt.goal import Limits
     from srs_opt.gait_opt.table import save_table
+    from srs_opt.judge.bodies import check_judge
+    from srs_opt.judge.opinion import Case, opinions
     from srs_opt.robot import load_robot
 
     robot = load_robot(options.robot)
     model = chosen_model(options, robot)
+    if options.judge:
+        check_judge([robot])
     begun = time.perf_counter()
     limits = limits_from(options)
     unfinished = options.out / "table.unfinished"  # an interrupted table goes on from here
@@ -299,7 +319,7 @@ def _run_table(options: argparse.Namespace) -> Answer:
     shutil.rmtree(unfinished, ignore_errors=True)
     best = max(g.speed_m_s for g in table.gaits)
     radii = [abs(g.radius_m) for g in table.gaits if g.radius_m is not None]
-    answer = {
+    answer: dict[str, Any] = {
         "objective": "table",
         "gaits": len(table.gaits),
         "speed_max_m_s": best,
@@ -308,7 +328,16 @@ def _run_table(options: argparse.Namespace) -> Answer:
         "solve_s": seconds,
     }
     words = f"{len(table.gaits)} gaits up to {best:.3f} m/s in {seconds:.0f} s"
-    return Answer(answer, words, files=tuple(files))
+    good = True
+    if options.judge:
+        say(options, "asking the other engine")
+        cases = [Case(g.name, g.gait, False) for g in table.gaits]
+        found = opinions(robot, cases, model, jobs=options.jobs, cluster=options.cluster, quiet=options.quiet)
+        answer["judge"] = [opinion.to_record() for opinion in found]
+        agree = sum(opinion.agrees for opinion in found)
+        words += f"; the other engine agrees about {agree} of them"
+        good = agree == len(found)
+    return Answer(answer, words, good, tuple(files))
 
 
 def main(argv: list[str] | None = None) -> int:

@@ -137,6 +137,7 @@ def summary(answer: dict[str, Any]) -> str:
         *_each_robot(answer),
         *_from_rest(answer),
         *_if_soft(answer),
+        *_judged(certificate),
     ]
     lines += [f"  {failure}" for failure in certificate["failures"]]
     if answer["interrupted"]:
@@ -221,3 +222,16 @@ def _freed(free: dict[str, Any] | None) -> list[str]:
     if beyond < _NOTHING_BEYOND:
         return [line + "more intervals buy nothing beyond a higher limit on the frequency"]
     return [line + f"beyond a higher limit on the frequency, more intervals buy {beyond:.1f} %"]
+
+
+def _judged(certificate: dict[str, Any]) -> list[str]:
+    """Return what the other engine says, where it was asked."""
+    lines = []
+    for opinion in certificate.get("judge", ()):
+        them, error = opinion["judge"], opinion["judge"]["error"]["speed_m_s"]
+        word = "agrees" if opinion["agrees"] else "DISAGREES"
+        lines.append(
+            f"  judge: {word} about robot '{opinion['name']}': {them['speed_m_s']:.4f} ± {error:.4f} m/s, "
+            f"{them['turn_rate_rad_s']:+.3f} rad/s in the other engine"
+        )
+    return lines

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import importlib.util
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -35,6 +35,13 @@ def check_engine() -> None:
             "the judge is another physics engine, package 'dartpy', which this Python lacks: "
             "pip install 'srs-opt[judge]' (in the project's folder: pip install '.[judge]'); Linux only"
         )
+
+
+def check_judge(robots: Sequence[Robot]) -> None:
+    """Raise InputError if the engine is missing or cannot stand for one of the robots."""
+    check_engine()
+    for robot in robots:
+        check_robot(robot)
 
 
 def check_robot(robot: Robot) -> None:

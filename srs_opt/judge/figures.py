@@ -70,7 +70,9 @@ def _panel(
 @styled
 def draw_replay(seen: Replay, walls: Any, width_m: float, stem: Path) -> tuple[Path, Path]:
     """Draw the engine's way and bodies among the walls, and our way; return the files."""
-    figure, axes = new_figure(1, 1, width_in=PAGE_IN, height_in=0.8 * PAGE_IN)
+    xmin, ymin, xmax, ymax = walls.bounds
+    height_in = PAGE_IN * min(max((ymax - ymin) / (xmax - xmin), 0.25), 1.0) + 0.6
+    figure, axes = new_figure(1, 1, width_in=PAGE_IN, height_in=height_in)
     fill_region(axes, walls, color=COLOURS[7], alpha=0.8)
     shown = np.linspace(0, len(seen.lines) - 1, BODIES).round().astype(int)
     for k in shown:
