@@ -20,8 +20,7 @@ from srs_opt.measurement.takes.take import (
     Frames,
     ReadSettings,
     Take,
-    even_clock,
-    on_clock,
+    take_of,
     unit_scale,
 )
 
@@ -61,17 +60,8 @@ def read_c3d(path: Path, settings: ReadSettings) -> Take:
     numbers = first + np.arange(len(points), dtype=float)
     frames = Frames(None, numbers, range(1, len(points) + 1))
     rate_hz = settings.rate_hz or (rate if np.isfinite(rate) and rate > 0 else None)
-    rate_hz, time, places = even_clock(path, frames, rate_hz, told)
-    return Take(
-        source=path,
-        name=path.stem,
-        rate_hz=rate_hz,
-        time_s=time,
-        markers=labels,
-        marker_positions=on_clock(points, places, len(time)),
-        scale_m=settings.scale_m or (unit_scale(path, 1, units) if units else None),
-        told=tuple(told),
-    )
+    scale = settings.scale_m or (unit_scale(path, 1, units) if units else None)
+    return take_of(path, frames, rate_hz, labels, points, told, scale_m=scale)
 
 
 # ezc3d ends the process on some damaged files, so a child process reads
@@ -184,17 +174,15 @@ def _video_take(
             "and count as lost"
         )
     points[unsure] = np.nan
-    rate, time, places = even_clock(path, Frames(None, number, lines), settings.rate_hz, told)
     several = len({animal for animal, _ in names if animal}) > 1 and any(a != p for a, p in names)
-    return Take(
-        source=path,
-        name=path.stem,
-        rate_hz=rate,
-        time_s=time,
-        markers=tuple(f"{a} {p}" if several else p for a, p in names),
-        marker_positions=on_clock(points, places, len(time)),
+    return take_of(
+        path,
+        Frames(None, number, lines),
+        settings.rate_hz,
+        [f"{a} {p}" if several else p for a, p in names],
+        points,
+        told,
         scale_m=settings.scale_m,
         flat=True,
         pixels=True,
-        told=tuple(told),
     )

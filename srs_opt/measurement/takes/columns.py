@@ -12,7 +12,7 @@ import numpy as np
 from srs_opt.document import load_schema, read_yaml, unknown_word, validate
 from srs_opt.errors import InputError
 from srs_opt.measurement.takes.sheet import Sheet, parse, read_sheet
-from srs_opt.measurement.takes.take import SECONDS, UNITS, Frames, ReadSettings, Take, even_clock, on_clock
+from srs_opt.measurement.takes.take import SECONDS, UNITS, Frames, ReadSettings, Take, take_of
 
 _UNIT = re.compile(r"[\[(]\s*([^\])]*?)\s*[\])]|[_ ](mm|cm|m|ms|s|px)$", re.IGNORECASE)
 _TIME = ("t", "time", "timestamp", "zeit", "temps", "elapsed", "seconds")
@@ -96,18 +96,16 @@ def read_columns(path: Path, settings: ReadSettings) -> Take:
     if time is None and number is None:
         told.append("no column holds a time: every row is taken as the next frame")
     lines = [n for n, _ in sheet.rows[first:]]
-    rate, clock, places = even_clock(path, Frames(time, number, lines), settings.rate_hz, told)
-    return Take(
-        source=path,
-        name=path.stem,
-        rate_hz=rate,
-        time_s=clock,
-        markers=names,
-        marker_positions=on_clock(points, places, len(clock)),
+    return take_of(
+        path,
+        Frames(time, number, lines),
+        settings.rate_hz,
+        names,
+        points,
+        told,
         scale_m=settings.scale_m or layout.scale_m,
-        pixels=layout.pixels or layout.y_down,
         flat=all("z" not in c for c in layout.markers.values()),
-        told=tuple(told),
+        pixels=layout.pixels or layout.y_down,
     )
 
 

@@ -14,8 +14,7 @@ from srs_opt.measurement.takes.take import (
     Frames,
     ReadSettings,
     Take,
-    even_clock,
-    on_clock,
+    take_of,
     unit_scale,
 )
 
@@ -75,23 +74,12 @@ def read_qualisys(path: Path, settings: ReadSettings) -> Take:
     clock = sheet.numbers(data, list(range(extra)))
     lines = [line for line, _ in sheet.rows[data:]]
     frames = Frames(clock[:, 1] if extra == 2 else None, clock[:, 0] if extra else None, lines)
-    rate, time, places = even_clock(path, frames, rate, told)
     if settings.scale_m is None:
         told.append("a TSV export states no units; Qualisys writes millimetres")
-    positions = on_clock(points, places, len(time))
-    nothing = np.empty((len(time), 0, 3))
-    return Take(
-        source=path,
-        name=path.stem,
-        rate_hz=rate,
-        time_s=time,
-        markers=() if bodies else names,
-        marker_positions=nothing if bodies else positions,
-        bodies=names if bodies else (),
-        body_positions=positions if bodies else nothing,
-        scale_m=settings.scale_m or 1e-3,
-        told=tuple(told),
-    )
+    scale, nothing = settings.scale_m or 1e-3, points[:, :0]
+    if bodies:
+        return take_of(path, frames, rate, (), nothing, told, scale_m=scale, bodies=names, body_points=points)
+    return take_of(path, frames, rate, names, points, told, scale_m=scale)
 
 
 def _without_zeros(points: Array, told: list[str]) -> Array:
@@ -140,17 +128,8 @@ def read_vicon(path: Path, settings: ReadSettings) -> Take:
     points = part.numbers(first, [k + j for k in starts for j in range(3)]).reshape(-1, len(starts), 3)
     number = part.numbers(first, [0])[:, 0] - 1  # Nexus counts frames from 1
     frames = Frames(None, number, [line for line, _ in rows[first:last]])
-    rate, time, places = even_clock(path, frames, rate, told)
-    return Take(
-        source=path,
-        name=path.stem,
-        rate_hz=rate,
-        time_s=time,
-        markers=names,
-        marker_positions=on_clock(points, places, len(time)),
-        scale_m=settings.scale_m or (unit_scale(path, rows[at + 4][0], units) if units else None),
-        told=tuple(told),
-    )
+    scale = settings.scale_m or (unit_scale(path, rows[at + 4][0], units) if units else None)
+    return take_of(path, frames, rate, names, points, told, scale_m=scale)
 
 
 def read_trc(path: Path, settings: ReadSettings) -> Take:
@@ -179,18 +158,9 @@ def read_trc(path: Path, settings: ReadSettings) -> Take:
     points = _without_zeros(points, told)
     clock = sheet.numbers(first, [0, 1])
     frames = Frames(clock[:, 1], clock[:, 0], [line for line, _ in rows[first:]])
-    rate, time, places = even_clock(path, frames, rate, told)
     units = facts.get("units", "")
-    return Take(
-        source=path,
-        name=path.stem,
-        rate_hz=rate,
-        time_s=time,
-        markers=names,
-        marker_positions=on_clock(points, places, len(time)),
-        scale_m=settings.scale_m or (unit_scale(path, 3, units) if units else None),
-        told=tuple(told),
-    )
+    scale = settings.scale_m or (unit_scale(path, 3, units) if units else None)
+    return take_of(path, frames, rate, names, points, told, scale_m=scale)
 
 
 def _trc_style(path: Path) -> tuple[str, str]:

@@ -11,7 +11,7 @@ import numpy as np
 from srs_opt.errors import InputError
 from srs_opt.measurement.records import Array
 from srs_opt.measurement.takes.sheet import Sheet, parse, printable, read_sheet
-from srs_opt.measurement.takes.take import Frames, ReadSettings, Take, even_clock, on_clock, unit_scale
+from srs_opt.measurement.takes.take import Frames, ReadSettings, Take, take_of, unit_scale
 
 MARKER_TYPES = ("marker", "rigid body marker", "bone marker")
 BODY_TYPES = ("rigid body", "bone")
@@ -86,22 +86,19 @@ def _read_columns(sheet: Sheet, settings: ReadSettings) -> Take:
     )
     values = sheet.numbers(header + 1, [0, clock])
     lines = [number for number, _ in sheet.rows[header + 1 :]]
-    rate, time, places = even_clock(
-        path, Frames(values[:, 1], values[:, 0], lines), _rate(facts, sheet.decimal), told
-    )
     markers = _unique([c for c in found if c.type in MARKER_TYPES])
     bodies = _unique([c for c in found if c.type in BODY_TYPES])
-    return Take(
-        source=path,
-        name=facts.get("take name") or path.stem,
-        rate_hz=rate,
-        time_s=time,
-        markers=tuple(c.name for c in markers),
-        marker_positions=on_clock(_positions(sheet, header + 1, markers), places, len(time)),
-        bodies=tuple(c.name for c in bodies),
-        body_positions=on_clock(_positions(sheet, header + 1, bodies), places, len(time)),
+    return take_of(
+        path,
+        Frames(values[:, 1], values[:, 0], lines),
+        _rate(facts, sheet.decimal),
+        [c.name for c in markers],
+        _positions(sheet, header + 1, markers),
+        told,
         scale_m=scale,
-        told=tuple(told),
+        name=facts.get("take name", ""),
+        bodies=[c.name for c in bodies],
+        body_points=_positions(sheet, header + 1, bodies),
     )
 
 
@@ -199,19 +196,8 @@ def _read_rows(sheet: Sheet, settings: ReadSettings) -> Take:
     for i, frame in enumerate(seen):
         for name, place in frame.items():
             points[i, labels.index(name)] = place
-    rate, time, places = even_clock(
-        path, Frames(clock[:, 1], clock[:, 0], [line for line, _ in rows]), settings.rate_hz, told
-    )
-    return Take(
-        source=path,
-        name=path.stem,
-        rate_hz=rate,
-        time_s=time,
-        markers=labels,
-        marker_positions=on_clock(points, places, len(time)),
-        scale_m=settings.scale_m,
-        told=tuple(told),
-    )
+    frames = Frames(clock[:, 1], clock[:, 0], [line for line, _ in rows])
+    return take_of(path, frames, settings.rate_hz, labels, points, told, scale_m=settings.scale_m)
 
 
 def _text(path: Path, line: int, cells: tuple[str, ...], k: int) -> str:

@@ -173,6 +173,55 @@ def on_clock(values: Array, places: np.ndarray, count: int) -> Array:
     return np.where(whole, out, np.nan)
 
 
+def take_of(
+    path: Path,
+    frames: Frames,
+    rate_hz: float | None,
+    labels: Sequence[str],
+    points: Array,
+    told: Sequence[str],
+    *,
+    scale_m: float | None,
+    name: str = "",
+    bodies: Sequence[str] = (),
+    body_points: Array | None = None,
+    flat: bool = False,
+    pixels: bool = False,
+) -> Take:
+    """Return the take of positions (T, P, 3) as the file has them, put on an even clock.
+
+    Parameters
+    ----------
+    rate_hz : float or None
+        What file or person say; else the times tell.
+    told : sequence of str
+        What the reader had to guess so far.
+
+    Raises
+    ------
+    InputError
+        As `even_clock`.
+    """
+    said = list(told)
+    rate, time, places = even_clock(path, frames, rate_hz, said)
+    if body_points is None:
+        body_points = np.empty((len(points), 0, 3))
+    return Take(
+        source=path,
+        name=name or path.stem,
+        rate_hz=rate,
+        time_s=time,
+        markers=tuple(labels),
+        marker_positions=on_clock(points, places, len(time)),
+        bodies=tuple(bodies),
+        body_positions=on_clock(body_points, places, len(time)),
+        scale_m=scale_m,
+        flat=flat,
+        pixels=pixels,
+        told=tuple(said),
+    )
+
+
 def unit_scale(path: Path, line: int, unit: str) -> float:
     """Return metres per unit.
 
