@@ -5,16 +5,19 @@ import math
 import casadi as ca
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from measure_fixtures import HEADER, ROBOT, ROBOT_YAML, track_text
 
 from srs_opt.calibrate.observe import _body_points
+from srs_opt.document import Document
 from srs_opt.errors import InputError
 from srs_opt.measurement.chain import chain_of, headings, link_positions, marker_jacobian, marker_positions
 from srs_opt.measurement.dataset import load_dataset, write_dataset
 from srs_opt.measurement.find_chain import find_chain, symmetric
 from srs_opt.measurement.labels import mend_labels
 from srs_opt.measurement.shape import shape_from_markers
-from srs_opt.measurement.spots import Spot, load_spots, named_layout
+from srs_opt.measurement.spots import Spot, load_spots, named_layout, spots_of
 from srs_opt.measurement.validate import problems
 from srs_opt.model.parameters import Structure
 from srs_opt.model.registry import build
@@ -191,3 +194,20 @@ def test_layouts_by_name_or_file(tmp_path):
     assert load_spots(str(file), 5) == (Spot(link=1), Spot(segment=2, at=0.5))
     with pytest.raises(InputError, match="chamber_middles or a file"):
         load_spots("ends", 5)
+
+
+entry = st.dictionaries(
+    st.sampled_from(["link", "segment", "at", "dx_m", "dy_m", "x"]),
+    st.one_of(st.integers(-3, 9), st.floats(), st.text(max_size=4), st.none(), st.booleans()),
+    max_size=4,
+)
+
+
+@given(st.one_of(st.lists(entry, max_size=8), entry, st.integers(), st.none()))
+@settings(max_examples=150, deadline=None)
+def test_any_list_is_read_or_refused_in_one_line(value):
+    spots, wrong = spots_of(Document("f.yaml", {"markers": value}), ("markers",), 5)
+    assert bool(spots) != bool(wrong)
+    assert all("\n" not in str(w) for w in wrong)
+    if spots:
+        assert np.isfinite(chain_of(ROBOT, spots).straight_m).all()
