@@ -51,6 +51,7 @@ def build_parser() -> argparse.ArgumentParser:
         metavar="NAME",
         help="effect to hide (repeat for several; default none)",
     )
+    add("--robot", type=Path, metavar="FILE", help="robot file of the robot in it (default: the WPI SRS)")
     add(
         "--scale",
         type=_number,
@@ -119,6 +120,7 @@ def make(options: argparse.Namespace) -> dict[str, object]:
 
     from virtual_lab.dataset import Recording, truth_file, write_dataset
     from virtual_lab.draw import draw_truth
+    from virtual_lab.robot_file import RobotFile, read_robot
     from virtual_lab.trials import design
     from virtual_lab.truth import Scatter
 
@@ -133,6 +135,7 @@ def make(options: argparse.Namespace) -> dict[str, object]:
         options.effect,
         np.random.default_rng([options.seed, 4]),
         (options.scale, options.scale) if options.scale is not None else (0.7, 1.4),
+        robot=read_robot(options.robot) if options.robot is not None else RobotFile(),
         bench_error=options.bench_error,
         scatter=Scatter(0.0, 0.0, 0.0) if options.no_scatter else Scatter(),
     )
@@ -149,12 +152,13 @@ def make(options: argparse.Namespace) -> dict[str, object]:
         maps=options.maps or options.maps_only,
         tracks=not options.maps_only,
     )
+    documented = truth.documented["effects"]
     folder = write_dataset(options.out, truth, trials, options.seed, recording)
     return {
         "dataset": str(folder),
         "truth": str(truth_file(folder)),
         "trials": len(trials),
-        "hidden": [e["name"] for e in (*truth.effects, *truth.unlisted)],
+        "hidden": [e["name"] for e in (*truth.effects, *truth.unlisted) if e not in documented],
         "seconds": round(time.perf_counter() - start, 3),
     }
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from virtual_lab import kernel
+from virtual_lab import kernel, soft
 from virtual_lab.errors import LabError
 from virtual_lab.trials import Trial
 from virtual_lab.truth import Truth
@@ -16,6 +16,8 @@ from virtual_lab.valves import delayed, merge, segment_switches, slow_to_fill
 Hidden = dict[str, dict[str, float]]
 STEP_OVER_DECAY = 1.8  # Runge-Kutta 4 is stable up to 2.78
 LONGEST_STEP_S = 2.5e-4
+SHORTEST_STEP_S = 1e-6  # a body that asks for shorter ones is rigid for every purpose
+RELAXATION_S = 0.005  # of silicone, where nothing else is said
 
 
 @dataclass(frozen=True)
@@ -32,10 +34,15 @@ NOMINAL = Factors()
 
 @dataclass(frozen=True)
 class Tables:
-    """Everything the integrator needs, as arrays (columns: see the kernel)."""
+    """Everything the integrator needs, as arrays (columns: see the kernels).
+
+    `segments` is that of a body which bends under load; a rigid one has none.
+    """
 
     links: np.ndarray
     lengths: np.ndarray
+    segments: np.ndarray | None
+    longest_step_s: float
     ground: np.ndarray
     bend: np.ndarray
     bias: np.ndarray
@@ -58,17 +65,91 @@ def assemble(
     ground = ground_table(truth, hidden)
     edges, sign = valve_table(truth, trial, end_s, hidden)
     push = push_table(truth, trial, sign, factors, hidden)
-    step = min(STEP_OVER_DECAY / max(fastest_decay(links, ground), 1.0), LONGEST_STEP_S) / refine
-    steps = np.maximum(np.ceil(np.diff(edges) / step), 1).astype(np.int64)
-    segments = truth.parameters.links - 1
-    lengths = np.full(segments, truth.parameters.segment_length_m)
+    count = truth.parameters.links - 1
+    lengths = np.full(count, truth.parameters.segment_length_m)
     if "long_segment" in hidden:
         lengths[int(hidden["long_segment"]["segment"]) - 1] *= 1.0 + hidden["long_segment"]["extra"]
-    bias = np.zeros(segments)
+    segments = segment_table(truth, lengths, ground[kernel.GAP], hidden)
+    longest = longest_step_s(links, lengths, ground, segments)
+    steps = np.maximum(np.ceil(np.diff(edges) * refine / longest), 1).astype(np.int64)
+    bias = np.zeros(count)
     bias += hidden.get("curvature_bias", {}).get("bias", 0.0)
     if "segment_bias" in hidden:
         bias[int(hidden["segment_bias"]["segment"]) - 1] += hidden["segment_bias"]["bias"]
-    return Tables(links, lengths, ground, bend_table(truth, hidden), bias, push, sign, edges, steps)
+    bend = bend_table(truth, hidden)
+    return Tables(links, lengths, segments, longest, ground, bend, bias, push, sign, edges, steps)
+
+
+def segment_table(truth: Truth, lengths: np.ndarray, gap_m: float, hidden: Hidden) -> np.ndarray | None:
+    """Return length, bending stiffness (chamber and gap in series) and relaxation time of every segment."""
+    p = truth.parameters
+    compliance = hidden.get("bending_compliance", {"flexibility": 0.0, "relaxation_s": RELAXATION_S})
+    flexibility = np.full(len(lengths), compliance["flexibility"])
+    if p.bending_stiffness_n_m2 is not None:
+        flexibility += 1 / p.bending_stiffness_n_m2
+    if p.gap_stiffness_n_m2 is not None:
+        flexibility += gap_m / (lengths * p.gap_stiffness_n_m2)
+    if not flexibility.any():
+        return None
+    own = p.bending_stiffness_n_m2 is not None or p.gap_stiffness_n_m2 is not None
+    relaxation = (p.bending_relaxation_s or RELAXATION_S) if own else compliance["relaxation_s"]
+    table = np.empty((len(lengths), 3))
+    table[:, soft.LENGTH], table[:, soft.STIFFNESS] = lengths, 1 / flexibility
+    table[:, soft.RELAXATION] = relaxation
+    return table
+
+
+def is_soft(truth: Truth) -> bool:
+    """Return whether the body bends under load."""
+    own = truth.parameters.bending_stiffness_n_m2, truth.parameters.gap_stiffness_n_m2
+    flexible = dict(truth.hidden()).get("bending_compliance", {"flexibility": 0.0})
+    return own != (None, None) or flexible["flexibility"] != 0
+
+
+def longest_step_s(
+    links: np.ndarray, lengths: np.ndarray, ground: np.ndarray, segments: np.ndarray | None
+) -> float:
+    """Return the step at which friction and the material's own damping are integrated stably.
+
+    Raises
+    ------
+    LabError
+        The body is so stiff that this would take for ever.
+    """
+    decay = max(fastest_decay(links, ground), 1.0)
+    if segments is not None:
+        stiffest = fastest_bending(links, lengths + ground[kernel.GAP], segments)
+        decay += max(stiffest * segments[0, soft.RELAXATION], math.sqrt(stiffest))
+    step = min(STEP_OVER_DECAY / decay, LONGEST_STEP_S)
+    if step < SHORTEST_STEP_S:
+        raise LabError(
+            f"a stiffness of {segments[0, soft.STIFFNESS]:g} N m^2 is rigid beside the loads; leave it out"
+            if segments is not None
+            else "friction is smoothed over too low a speed"
+        )
+    return step
+
+
+def fastest_bending(links: np.ndarray, pitch: np.ndarray, segments: np.ndarray) -> float:
+    """Return the square of the highest bending mode's angular frequency, straight body, 1/s^2.
+
+    Bends move links across only; a bent body's links move no more across than the straight one's, but along
+    as well, which the factor allows for.
+    """
+    n = len(pitch)
+    place = np.concatenate([[0.0], np.cumsum(pitch)])
+    across = np.zeros((n + 2, n + 1))  # of every link, per motion: across, turn, bend of each segment
+    turn = np.zeros((n + 2, n + 1))
+    across[0], across[1], turn[1] = 1.0, place, 1.0
+    for s in range(n):
+        ahead = place > place[s]
+        middle = place[s] + 0.5 * pitch[s]
+        across[2 + s] = np.where(ahead, (place - middle) * segments[s, soft.LENGTH], 0.0)
+        turn[2 + s] = np.where(ahead, segments[s, soft.LENGTH], 0.0)
+    mass = (across * links[:, kernel.MASS]) @ across.T + (turn * links[:, kernel.INERTIA]) @ turn.T
+    free = mass[2:, 2:] - mass[2:, :2] @ np.linalg.solve(mass[:2, :2], mass[:2, 2:])
+    spring = np.diag(segments[:, soft.LENGTH] * segments[:, soft.STIFFNESS])
+    return 1.3 * float(np.max(np.linalg.eigvals(np.linalg.solve(free, spring)).real))
 
 
 def link_table(truth: Truth, factors: Factors, hidden: Hidden) -> np.ndarray:
@@ -178,7 +259,8 @@ def valve_table(truth: Truth, trial: Trial, end_s: float, hidden: Hidden) -> tup
         slow = hidden.get("slow_valve")
         if slow and int(slow["segment"]) == segment:
             switches = slow_to_fill(switches, slow["delay_s"])
-        per_segment.append(delayed(switches, hidden.get("dead_time", {}).get("delay_s", 0.0)))
+        delay_s = truth.parameters.valve_delay_s + hidden.get("dead_time", {}).get("delay_s", 0.0)
+        per_segment.append(delayed(switches, delay_s))
     return merge(per_segment, end_s)
 
 

@@ -90,6 +90,7 @@ _LISTED = (
     _listed("fill_exhaust_asymmetry", "ratio", 0.5, True, "bending"),
     _listed("supply_droop", "per_hz", 0.10, False, "bending"),
     _listed("curvature_stiffening", "per_curv2", 6e-4, False, "bending"),
+    _listed("bending_compliance", "flexibility relaxation_s", 200.0, False, "bending", relaxation_s=0.005),
     _listed("hysteresis", "ratio width", 0.35, False, "bending", width=4.0),
     _listed("viscous_rolling", "damping", 0.06, False, "wheels"),
     _listed("stribeck", "excess speed", 1.0, False, "wheels", speed=0.08),

@@ -159,7 +159,7 @@ def _write_descriptions(folder: Path, name: str, truth: Truth, recording: Record
         "markers": recording.markers,
     }
     write_text(folder / "dataset.yaml", yaml.safe_dump(about, sort_keys=False))
-    robot = {"name": "WPI SRS", **dataclasses.asdict(truth.bench or truth.parameters), "effects": []}
+    robot = {**truth.documented, **(truth.bench or truth.parameters).to_record()}
     if truth.relative_sd:
         robot["relative_sd"] = {key: float(sd) for key, sd in truth.relative_sd.items()}
     write_text(folder / "robot.yaml", yaml.safe_dump(robot, sort_keys=False))

@@ -9,7 +9,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from virtual_lab.catalogue import EffectKind, find_kind
-from virtual_lab.truth import DOCUMENTED, USUAL_SCATTER, Parameters, Scatter, Truth
+from virtual_lab.robot_file import RobotFile
+from virtual_lab.truth import USUAL_SCATTER, Scatter, Truth
 
 BENCH_SD: Mapping[str, float] = {
     "friction_tangential": 0.05,
@@ -52,7 +53,7 @@ def draw_truth(
     rng: np.random.Generator,
     scale_range: tuple[float, float] = (0.7, 1.4),
     *,
-    bench: Parameters = DOCUMENTED,
+    robot: RobotFile = RobotFile(),
     bench_error: float = 1.0,
     scatter: Scatter = USUAL_SCATTER,
 ) -> Truth:
@@ -65,8 +66,8 @@ def draw_truth(
     rng : numpy.random.Generator
     scale_range : pair of float
         Sizes over typical ones.
-    bench : Parameters
-        What the robot file says.
+    robot : RobotFile
+        What the robot file says; how well it claims to know it adds to BENCH_SD.
     bench_error : float
         The true values differ from the bench by normal errors of this many of its standard deviations
         (0: the bench is right), cut at two standard deviations each.
@@ -80,14 +81,17 @@ def draw_truth(
     """
     words = names.split("+") if isinstance(names, str) else list(names)
     kinds = [find_kind(word) for word in words if word not in ("", "none")]
-    errors = np.clip(rng.standard_normal(len(BENCH_SD)), -2.0, 2.0) * bench_error
-    changes = {k: getattr(bench, k) * (1.0 + sd * float(e)) for (k, sd), e in zip(BENCH_SD.items(), errors)}
+    bench, sds = robot.parameters, {**BENCH_SD, **robot.relative_sd}
+    errors = np.clip(rng.standard_normal(len(sds)), -2.0, 2.0) * bench_error
+    factors = np.maximum(1.0 + np.array(list(sds.values())) * errors, 0.05)
+    changes = {k: getattr(bench, k) * float(f) for k, f in zip(sds, factors)}
     drawn = [(kind.listed, draw_effect(kind, rng, bench.links, scale_range)) for kind in kinds]
     return Truth(
         parameters=dataclasses.replace(bench, **changes),
-        effects=tuple(effect for listed, effect in drawn if listed),
+        effects=(*robot.effects, *(e for listed, e in drawn if listed)),
         unlisted=tuple(effect for listed, effect in drawn if not listed),
         scatter=scatter,
         bench=bench,
-        relative_sd=dict(BENCH_SD),
+        relative_sd=sds,
+        documented={**robot.other, "effects": [dict(e) for e in robot.effects]},
     )

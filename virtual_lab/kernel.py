@@ -7,8 +7,8 @@ equations then ask that the links' inertia forces and the applied forces do the
 same work in the three partial motions (two translations and the turn about the
 tail).
 
-All compiled code lives in this one file, because the cache of compiled code
-notices changes of a function's own file only.
+The cache of compiled code notices changes of a function's own file only, so what
+is compiled lives in this one file; `soft`, which calls it, asks for its state.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ CHAIN_COLUMNS = 11
 GROUND_SIZE = 35
 # physics of the bending segments
 (
-    TAU1, TAU2, ASYMMETRY, STIFFENING, HYSTERESIS, WIDTH, DECAY, RIPPLE, RIPPLE_HZ, WARMING,
-) = range(10)  # fmt: skip
-BEND_SIZE = 10
+    TAU1, TAU2, ASYMMETRY, STIFFENING, HYSTERESIS, WIDTH, DECAY, RIPPLE, RIPPLE_HZ, WARMING, STRETCH,
+) = range(11)  # fmt: skip
+BEND_SIZE = 11
 
 _compiled = njit(cache=True, error_model="numpy")
 
@@ -128,20 +128,37 @@ def sinc_derivatives(x):
 
 @_compiled
 def chord(kappa, length, gap, ratio):
-    """Return the distance between two neighbouring links and its derivatives in the curvature.
+    """Return the distance c between neighbouring links, and c_k, c_kk, c_l, c_kl, c_ll.
 
-    Half gap, arc and half gap are symmetric about the bisector of the links' headings, so the whole lies
-    along it; with `ratio` the half gaps are arcs of curvature ratio * kappa.
+    Derivatives are in curvature (k) and chamber length (l). Half gap, arc and half gap are symmetric about
+    the bisector of the links' headings, so the whole lies along it; with `ratio` the half gaps are arcs of
+    curvature ratio * kappa.
     """
     u = 0.5 * length
     f, f1, f2 = sinc_derivatives(u * kappa)
     c, c1, c2 = length * f, length * u * f1, length * u * u * f2
+    sine = math.sin(u * kappa)
+    l1, kl, ll = math.cos(u * kappa), -u * sine, -0.5 * kappa * sine
     a, b = 0.5 * (length + 0.5 * ratio * gap), 0.25 * ratio * gap
     f, f1, f2 = sinc_derivatives(b * kappa)
     f1, f2 = b * f1, b * b * f2
-    g = math.cos(a * kappa)
-    g1, g2 = -a * math.sin(a * kappa), -a * a * g
-    return c + gap * f * g, c1 + gap * (f1 * g + f * g1), c2 + gap * (f2 * g + 2.0 * f1 * g1 + f * g2)
+    g, sine = math.cos(a * kappa), math.sin(a * kappa)
+    g1, g2 = -a * sine, -a * a * g
+    h, h1, hh = -0.5 * kappa * sine, -0.5 * sine - 0.5 * a * kappa * g, -0.25 * kappa * kappa * g
+    return (
+        c + gap * f * g, c1 + gap * (f1 * g + f * g1), c2 + gap * (f2 * g + 2.0 * f1 * g1 + f * g2),
+        l1 + gap * f * h, kl + gap * (f1 * h + f * h1), ll + gap * f * hh,
+    )  # fmt: skip
+
+
+@_compiled
+def set_lengths(shape, natural, stretch, lengths):
+    """Fill in lengths, their rates and accelerations of chambers of no-load curvatures `shape`."""
+    for s in range(natural.shape[0]):
+        kappa, rate, size = shape[s, 0], shape[s, 1], stretch * natural[s]
+        lengths[s, 0] = natural[s] + size * kappa * kappa
+        lengths[s, 1] = 2.0 * size * kappa * rate
+        lengths[s, 2] = 2.0 * size * (rate * rate + kappa * shape[s, 3])
 
 
 @_compiled
@@ -152,13 +169,17 @@ def set_chain(shape, lengths, ground, chain):
     segments = lengths.shape[0]
     for s in range(segments):
         kappa, rate, acc = shape[s, 0], shape[s, 1], shape[s, 3]
-        c, c1, c2 = chord(kappa, lengths[s], ground[GAP], ground[GAP_RATIO])
-        cd, cdd = c1 * rate, c2 * rate * rate + c1 * acc
-        half = 0.5 * (lengths[s] + ground[GAP_RATIO] * ground[GAP])
+        length, grow, grow2 = lengths[s, 0], lengths[s, 1], lengths[s, 2]
+        c, c1, c2, l1, kl, ll = chord(kappa, length, ground[GAP], ground[GAP_RATIO])
+        cd = c1 * rate + l1 * grow
+        cdd = c2 * rate * rate + 2.0 * kl * rate * grow + ll * grow * grow + c1 * acc + l1 * grow2
+        half = 0.5 * (length + ground[GAP_RATIO] * ground[GAP])
+        turn1 = half * rate + 0.5 * grow * kappa
+        turn2 = half * acc + grow * rate + 0.5 * grow2 * kappa
         ch, sh = math.cos(half * kappa), math.sin(half * kappa)
         co, si = chain[s, COS], chain[s, SIN]
         mc, ms = co * ch - si * sh, si * ch + co * sh
-        w, wd = chain[s, TURN] + half * rate, chain[s, TURN_RATE] + half * acc
+        w, wd = chain[s, TURN] + turn1, chain[s, TURN_RATE] + turn2
         along, across = cdd - c * w * w, 2.0 * cd * w + c * wd
         chain[s + 1, RX] = chain[s, RX] + c * mc
         chain[s + 1, RY] = chain[s, RY] + c * ms
@@ -168,8 +189,8 @@ def set_chain(shape, lengths, ground, chain):
         chain[s + 1, AY] = chain[s, AY] + along * ms + across * mc
         chain[s + 1, COS] = mc * ch - ms * sh
         chain[s + 1, SIN] = ms * ch + mc * sh
-        chain[s + 1, TURN] = chain[s, TURN] + 2.0 * half * rate
-        chain[s + 1, TURN_RATE] = chain[s, TURN_RATE] + 2.0 * half * acc
+        chain[s + 1, TURN] = chain[s, TURN] + 2.0 * turn1
+        chain[s + 1, TURN_RATE] = chain[s, TURN_RATE] + 2.0 * turn2
         chain[s, BEND] += 0.5 * kappa
         chain[s + 1, BEND] = 0.5 * kappa
     chain[0, BEND] *= 2.0
@@ -339,6 +360,7 @@ def integrate(state, shape, edges, steps, push, sign, bias, bend, lengths, links
     samples = np.empty((times.shape[0], 6 + 2 * n))
     now, old, middle, after = state.copy(), state.copy(), shape.copy(), shape.copy()
     start, half, end = np.zeros((3, n + 1, CHAIN_COLUMNS))
+    long, stretch = np.empty((n, 3)), bend[STRETCH]
     rates, trial = np.empty((4, 6)), np.empty(6)
     taken = 0
     while taken < times.shape[0] and times[taken] <= t_end:
@@ -348,13 +370,16 @@ def integrate(state, shape, edges, steps, push, sign, bias, bend, lengths, links
     for k in range(steps.shape[0]):
         h = (edges[k + 1] - edges[k]) / steps[k]
         set_accelerations(edges[k], before, push[k], bias, sign[k], bend)
-        set_chain(before, lengths, ground, start)
+        set_lengths(before, lengths, stretch, long)
+        set_chain(before, long, ground, start)
         for j in range(steps[k]):
             t = edges[k] + j * h
             bend_step(t, 0.5 * h, before, push[k], bias, sign[k], bend, middle)
             bend_step(t + 0.5 * h, 0.5 * h, middle, push[k], bias, sign[k], bend, after)
-            set_chain(middle, lengths, ground, half)
-            set_chain(after, lengths, ground, end)
+            set_lengths(middle, lengths, stretch, long)
+            set_chain(middle, long, ground, half)
+            set_lengths(after, lengths, stretch, long)
+            set_chain(after, long, ground, end)
             old[:] = now
             body_step(h, now, start, half, end, links, ground, rates, trial)
             last = j == steps[k] - 1

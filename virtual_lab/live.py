@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
 
-from virtual_lab.assemble import (
-    LONGEST_STEP_S,
-    NOMINAL,
-    STEP_OVER_DECAY,
-    assemble,
-    fastest_decay,
-    push_table,
-)
+from virtual_lab.assemble import NOMINAL, assemble, push_table
 from virtual_lab.errors import LabError
-from virtual_lab.simulate import Run, look, sample
+from virtual_lab.simulate import Run, look, rest_state, sample
 from virtual_lab.trials import Trial
 from virtual_lab.truth import Truth
 
@@ -33,16 +27,15 @@ class LiveRobot:
         names = {name for name, _ in truth.hidden()}
         if unknown := names & {"hysteresis", "dead_time", "slow_valve"}:
             raise LabError(f"{', '.join(sorted(unknown))}: the live robot keeps no memory of earlier valves")
+        if truth.parameters.valve_delay_s > 0:
+            raise LabError("valve_delay_s: the live robot keeps no memory of earlier valves")
         self._truth, self.time_s = truth, 0.0
         self._hidden = dict(truth.hidden())
         still = Trial("live", 1.0, 0.0, kind="still")
         self._tables = assemble(truth, still, 1.0)
-        self._step_s = min(
-            STEP_OVER_DECAY / max(fastest_decay(self._tables.links, self._tables.ground), 1.0), LONGEST_STEP_S
-        )
         segments = truth.parameters.links - 1
         self._shape = np.zeros((segments, 4))
-        self._state = np.array([0.0, 0.0, heading_rad, 0.0, 0.0, 0.0])
+        self._state = rest_state(self._tables, heading_rad)
         centre = self.look().centre_of_mass()[0]
         self._state[:2] = x_m - centre[0], y_m - centre[1]
 
@@ -53,19 +46,17 @@ class LiveRobot:
         sign = np.asarray(valves, dtype=float)[None, :]
         push = push_table(self._truth, trial, sign, NOMINAL, self._hidden)
         edges = np.array([self.time_s, self.time_s + duration_s])
-        steps = np.array([max(math.ceil(duration_s / self._step_s), 1)])
-        tables = type(t)(t.links, t.lengths, t.ground, t.bend, t.bias, push, sign, edges, steps)
+        steps = np.array([max(math.ceil(duration_s / t.longest_step_s), 1)])
+        tables = dataclasses.replace(t, push=push, sign=sign, edges=edges, steps=steps)
         self._keep(sample(tables, self._state, self._shape, edges[1:])[-1])
         self.time_s = float(edges[1])
 
     def look(self) -> Run:
         """Return places and headings of all links now."""
-        n = self._shape.shape[0]
         row = np.concatenate([self._state, self._shape[:, 0], self._shape[:, 1]])
-        assert row.size == 6 + 2 * n
         return look(self._tables, row[None, :], np.array([self.time_s]))
 
     def _keep(self, row: np.ndarray) -> None:
-        n = self._shape.shape[0]
-        self._state = row[:6].copy()
-        self._shape[:, 0], self._shape[:, 1] = row[6 : 6 + n], row[6 + n : 6 + 2 * n]
+        size = self._state.size
+        self._state = row[:size].copy()
+        self._shape[:, :2] = row[size:].reshape(2, -1).T

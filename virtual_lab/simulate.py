@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from virtual_lab import kernel
+from virtual_lab import kernel, soft
 from virtual_lab.assemble import NOMINAL, Factors, Tables, assemble
 from virtual_lab.trials import Trial
 from virtual_lab.truth import Truth
@@ -70,17 +70,32 @@ def run(
     order, back = np.unique(np.asarray(times, dtype=float), return_inverse=True)
     end_s = max(float(order[-1]), 0.0) + 1e-3
     tables = assemble(truth, trial, end_s, factors, refine)
-    state = np.array([0.0, 0.0, trial.heading_rad, 0.0, 0.0, 0.0])
+    state = rest_state(tables, trial.heading_rad)
     shape = np.zeros((truth.parameters.links - 1, 4))
     return look(tables, sample(tables, state, shape, order)[back], np.asarray(times, dtype=float))
 
 
 def sample(tables: Tables, state: np.ndarray, shape: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Integrate from a state of tail and segments; return the kernel's samples at increasing times."""
+    """Integrate from a state of tail and segments; return samples at increasing times.
+
+    Rows are pose and velocity of the tail, curvatures, their rates; of a body that bends under load, whose
+    state holds its bends and their rates as well, then no-load curvatures and their rates.
+    """
     t = tables
-    return kernel.integrate(
-        state, shape, t.edges, t.steps, t.push, t.sign, t.bias, t.bend, t.lengths, t.links, t.ground, times
-    )
+    rest = t.links, t.ground, times
+    if t.segments is None:
+        return kernel.integrate(
+            state, shape, t.edges, t.steps, t.push, t.sign, t.bias, t.bend, t.lengths, *rest
+        )
+    return soft.integrate(state, shape, t.edges, t.steps, t.push, t.sign, t.bias, t.bend, t.segments, *rest)
+
+
+def rest_state(tables: Tables, heading_rad: float) -> np.ndarray:
+    """Return the state of the straight robot at rest, its tail at the origin."""
+    bends = 0 if tables.segments is None else 2 * len(tables.segments)
+    state = np.zeros(6 + bends)
+    state[2] = heading_rad
+    return state
 
 
 def look(tables: Tables, samples: np.ndarray, times: np.ndarray) -> Run:
@@ -90,7 +105,9 @@ def look(tables: Tables, samples: np.ndarray, times: np.ndarray) -> Run:
     x, y, theta = (np.empty((len(samples), n + 1)) for _ in range(3))
     x[:, 0], y[:, 0], theta[:, 0] = samples[:, 0], samples[:, 1], samples[:, 2]
     gap, ratio = tables.ground[kernel.GAP], tables.ground[kernel.GAP_RATIO]
-    for s, length in enumerate(tables.lengths):
+    no_load = kappa if tables.segments is None else samples[:, 6 + 2 * n : 6 + 3 * n]
+    for s, natural in enumerate(tables.lengths):
+        length = natural * (1.0 + tables.bend[kernel.STRETCH] * no_load[:, s] ** 2)
         arc = np.sinc(0.5 * length * kappa[:, s] / np.pi) * length
         tilt = 0.25 * ratio * gap * kappa[:, s]  # a half gap's chord against its link
         turn = (length + ratio * gap) * kappa[:, s]

@@ -15,7 +15,10 @@ MIN_LINKS, MAX_LINKS = 3, 64
 
 @dataclass(frozen=True)
 class Parameters:
-    """The robot's values, under the keys of a robot file (SI units, pressure in kPa)."""
+    """The robot's values, under the keys of a robot file (SI units, pressure in kPa).
+
+    What has no bending stiffness, segments or gaps, is rigid (None).
+    """
 
     links: int = 5
     segment_length_m: float = 0.037
@@ -29,6 +32,10 @@ class Parameters:
     tau1_s: float = 0.08
     tau2_s: float = 0.05
     gravity_m_s2: float = 9.81
+    bending_stiffness_n_m2: float | None = None
+    bending_relaxation_s: float | None = None
+    gap_stiffness_n_m2: float | None = None
+    valve_delay_s: float = 0.0
 
     def __post_init__(self) -> None:
         if not MIN_LINKS <= self.links <= MAX_LINKS:
@@ -38,6 +45,14 @@ class Parameters:
         for key in ("segment_length_m", "link_mass_kg", "tau1_s", "tau2_s", "gravity_m_s2"):
             if not getattr(self, key) > 0:
                 raise LabError(f"{key} must be above 0, found {getattr(self, key)!r}")
+        for key in ("bending_stiffness_n_m2", "bending_relaxation_s", "gap_stiffness_n_m2"):
+            value = getattr(self, key)
+            if value is not None and not value > 0:
+                raise LabError(f"{key} must be above 0, found {value!r}")
+
+    def to_record(self) -> dict[str, Any]:
+        """Return the values that a robot file of this robot holds."""
+        return {key: value for key, value in dataclasses.asdict(self).items() if value is not None}
 
 
 @dataclass(frozen=True)
@@ -71,6 +86,8 @@ class Truth:
         What the robot file says; None: the true values.
     relative_sd : mapping
         How well the robot file claims to know each value.
+    documented : mapping
+        What else the robot file says.
     """
 
     parameters: Parameters = DOCUMENTED
@@ -80,6 +97,7 @@ class Truth:
     scatter: Scatter = USUAL_SCATTER
     bench: Parameters | None = None
     relative_sd: Mapping[str, float] = field(default_factory=dict)
+    documented: Mapping[str, Any] = field(default_factory=lambda: {"name": "WPI SRS", "effects": []})
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "effects", tuple(dict(e) for e in self.effects))

@@ -68,7 +68,9 @@ def test_accelerations_match_free_links_with_multipliers(links):
     shape = np.column_stack([rng.normal(0, s, links - 1) for s in (10.0, 50.0, 0.0, 500.0)])
     state = rng.normal(0, [1, 1, 2, 0.2, 0.2, 1.0])
     chain, rates = np.zeros((links, kernel.CHAIN_COLUMNS)), np.zeros(6)
-    kernel.set_chain(shape, tables.lengths, tables.ground, chain)
+    lengths = np.zeros((links - 1, 3))
+    kernel.set_lengths(shape, tables.lengths, 0.0, lengths)
+    kernel.set_chain(shape, lengths, tables.ground, chain)
     kernel.body_rates(state, chain, tables.links, tables.ground, rates)
 
     def pose(t):
