@@ -66,11 +66,7 @@ def make_parser(
         parser.add_argument(
             "--robot", type=Path, metavar="FILE", help="robot file (default: the built-in WPI SRS)"
         )
-        parser.add_argument(
-            "--model",
-            choices=("complex", "simplified", "compliant"),
-            help="dynamic model (default: compliant where the robot file has a stiffness, else complex)",
-        )
+        add_model(parser)
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="folder for the files (default: out/<command>)"
     )
@@ -102,6 +98,15 @@ def make_parser(
             "--cluster", metavar="ADDRESS", help="Dask scheduler to send the work to, host:port"
         )
     return parser
+
+
+def add_model(parser: argparse.ArgumentParser) -> None:
+    """Add the choice of the dynamic model."""
+    parser.add_argument(
+        "--model",
+        choices=("complex", "simplified", "compliant"),
+        help="dynamic model (default: compliant where the robot file has a stiffness, else complex)",
+    )
 
 
 def chosen_model(options: argparse.Namespace, robot: Robot) -> str:

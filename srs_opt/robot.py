@@ -110,7 +110,12 @@ class Robot:
 
     @property
     def is_soft(self) -> bool:
-        """Whether the body bends under load."""
+        """Whether the body bends under load, by its own stiffness or an effect's."""
+        return self.has_stiffness or bool(self.effects and _bending(self.effects))
+
+    @property
+    def has_stiffness(self) -> bool:
+        """Whether the robot file gives the segments or the gaps a stiffness."""
         return self.bending_stiffness_n_m2 is not None or self.gap_stiffness_n_m2 is not None
 
     @property
@@ -151,6 +156,13 @@ class Robot:
 
     def __hash__(self) -> int:
         return hash(json.dumps(self.to_record(), sort_keys=True))
+
+
+def _bending(effects: tuple[EffectSpec, ...]) -> bool:
+    from srs_opt.model.effects import all_effects
+
+    known = all_effects()
+    return any(known[e["name"]].bends and e[known[e["name"]].size.name] != 0 for e in effects)
 
 
 def _plain(value: Any) -> Any:
@@ -200,7 +212,7 @@ def robot_from_document(document: Document) -> Robot:
         if isinstance(value, (int, float)):
             record[key] = int(value) if key == "links" else float(value)
     robot = Robot(**record)
-    if robot.is_soft and robot.bending_relaxation_s is None:
+    if robot.has_stiffness and robot.bending_relaxation_s is None:
         robot = dataclasses.replace(robot, bending_relaxation_s=RELAXATION_S)
     if robot.effects:
         from srs_opt.model.effects.entries import check_body

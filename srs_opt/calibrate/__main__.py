@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from srs_opt.command import (
     Answer,
     Parser,
+    add_model,
     make_parser,
     one_thread_of_linear_algebra,
     run_command,
@@ -37,7 +38,7 @@ def build_parser() -> Parser:
     parser.add_argument(
         "--robot", type=Path, metavar="FILE", help="robot file to start from (default: the data set's own)"
     )
-    parser.add_argument("--model", choices=("complex", "simplified"), default="complex", help="dynamic model")
+    add_model(parser)
     return parser
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from srs_opt.model.parameters import COMPLIANCE_PARAMETERS
 from srs_opt.robot import Robot
 
 INFINITY = math.inf
@@ -76,11 +77,13 @@ class Coordinate:
 def base_coordinates(robot: Robot) -> tuple[Coordinate, ...]:
     """Return the calibrated robot parameters: those with a bench deviation, and the nuisance v_s.
 
+    The stiffness of a body that bends under load is among them where it has one.
+
     A deviation of 0 fixes a parameter. One that trials scatter about stays a coordinate (`FIXED_SD`): the
     scatter needs its slopes.
     """
     sds = {**ASSUMED_SD, **robot.relative_sd}
-    free = {n for n, sd in sds.items() if sd > 0 and n in _CALIBRATED and getattr(robot, n) > 0}
+    free = {n for n, sd in sds.items() if sd > 0 and n in _CALIBRATED and (getattr(robot, n) or 0) > 0}
     chosen = [
         Coordinate(name, prior_sd=sds[name] if name in free else FIXED_SD)
         for name in _CALIBRATED
@@ -91,4 +94,11 @@ def base_coordinates(robot: Robot) -> tuple[Coordinate, ...]:
     return (*chosen, speed)
 
 
-_CALIBRATED = (*ASSUMED_SD, "segment_length_m", "gap_length_m", "link_mass_kg", "link_inertia_kg_m2")
+_CALIBRATED = (
+    *ASSUMED_SD,
+    "segment_length_m",
+    "gap_length_m",
+    "link_mass_kg",
+    "link_inertia_kg_m2",
+    *COMPLIANCE_PARAMETERS,
+)

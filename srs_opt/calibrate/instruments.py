@@ -14,6 +14,7 @@ from srs_opt.calibrate.coordinates import SCATTER_SD, Coordinate
 from srs_opt.calibrate.gram import TrialGram
 from srs_opt.calibrate.model import Conditions, Model, Values, camera_effects
 from srs_opt.measurement.records import Bench, Check, TowTest
+from srs_opt.model.compliant import CompliantModel
 from srs_opt.model.effects import all_effects
 from srs_opt.model.effects.effect import LinkState
 from srs_opt.model.mechanics import Mechanics
@@ -57,6 +58,7 @@ QUANTITIES = (
     "ruler_scale_at_1m",
     "valve_light_delay_s",
     "floor_angle_rad",
+    "bending_flexibility_1_n_m2",
 )
 
 
@@ -65,7 +67,7 @@ def _instrument_readings(structure: Structure) -> ca.Function:
     """Return ``(p, camera, clock_s) -> (QUANTITIES)`` for the straight robot at rest.
 
     Scales under the tail's and the head's wheels; a short ruler across at x = 0 and 1 m, measured over true
-    length; when a light that follows the valve's command is seen; how steep the floor is.
+    length; when a light that follows the valve's command is seen; how steep the floor is; 1/EI of a segment.
     """
     parameters, m, _ = build(structure)
     clock = ca.SX.sym("clock")
@@ -85,7 +87,9 @@ def _instrument_readings(structure: Structure) -> ca.Function:
             fx, fy = effect.link_force(e, state)
             slope = slope + ca.vertcat(fx[0], fy[0]) / (m.mass[0] * parameters["gravity_m_s2"])
     steep = ca.sqrt(ca.sumsqr(slope) + 1e-24)
-    readings = [weight[0], weight[-1], across(0, 0, camera), across(1, 0, camera), -clock, ca.asin(steep)]
+    assert isinstance(m, CompliantModel)
+    optics = [across(0, 0, camera), across(1, 0, camera)]
+    readings = [weight[0], weight[-1], *optics, -clock, ca.asin(steep), 1 / m.stiffness()]
     straight = [ca.substitute(ca.SX(r), m.kappa, ca.SX.zeros(m.kappa.shape)) for r in readings]
     return ca.Function("readings", [parameters.vector, camera, clock], [ca.vertcat(*straight)])
 

@@ -31,7 +31,7 @@ TRACKS = 12  # simulated for that, at most
 
 
 def fit_maps(
-    dataset: DataSet, model: str = "complex", report: Callable[[str], None] | None = None
+    dataset: DataSet, model: str | None = None, report: Callable[[str], None] | None = None
 ) -> Calibration:
     """Fit the robot's parameters to speed and path curvature of every row of maps.csv.
 
@@ -59,12 +59,12 @@ class Maps:
     Parameters
     ----------
     dataset : DataSet
-    model : {"complex", "simplified"}
+    model : {"complex", "simplified", "compliant"} or None
     base : sequence of Coordinate
         Robot parameters and parts of the robot's own effects.
     """
 
-    def __init__(self, dataset: DataSet, model: str, base: Sequence[Coordinate]) -> None:
+    def __init__(self, dataset: DataSet, model: str | None, base: Sequence[Coordinate]) -> None:
         self.robot, self.model = dataset.robot, model
         self.rows = dict(enumerate(dataset.maps))
         self.trials: tuple[Trial, ...] = ()
@@ -130,7 +130,7 @@ def robot_at(robot: Robot, values: Mapping[str, float]) -> Robot:
 
 
 def parameter_moves(
-    robot: Robot, values: Mapping[str, float], coordinate: Coordinate, model: str
+    robot: Robot, values: Mapping[str, float], coordinate: Coordinate, model: str | None
 ) -> dict[str, float]:
     """Return the derivatives of the model's parameters, by name, by one coordinate of a fit.
 
@@ -151,7 +151,7 @@ def parameter_moves(
 
 
 def path(
-    robot: Robot, orbit: Orbit, moves: Sequence[Mapping[str, float]], model: str
+    robot: Robot, orbit: Orbit, moves: Sequence[Mapping[str, float]], model: str | None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return speed (m/s) and curvature (1/m, + left) of a gait's path, and their slopes (2, K).
 
@@ -211,7 +211,7 @@ def _root(row: MapRow, scatter: np.ndarray, own: np.ndarray) -> np.ndarray:
 
 
 def _sd_with_tracks(
-    dataset: DataSet, model: str, base: Sequence[Coordinate], point: Point
+    dataset: DataSet, model: str | None, base: Sequence[Coordinate], point: Point
 ) -> dict[str, float]:
     """Return the deviations that one track of every gait, as the data set's camera sees it, would leave."""
     rows = dataset.maps[:: math.ceil(len(dataset.maps) / TRACKS)]

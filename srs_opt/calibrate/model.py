@@ -17,13 +17,18 @@ from srs_opt.calibrate.coordinates import Coordinate
 from srs_opt.calibrate.forms import Form, form_of_entry, forms_of
 from srs_opt.model.effects import all_effects
 from srs_opt.model.effects.effect import Effect
-from srs_opt.model.parameters import Structure, effect_symbols
+from srs_opt.model.parameters import COMPLIANCE_PARAMETERS, Structure, effect_symbols
 from srs_opt.model.registry import build
 from srs_opt.robot import Robot
 from srs_opt.simulate.buffered import Buffered
 
 # hooks that only change a parameter of the robot, which is packed changed: no equation has to hold them
-_FOLDED = {"gain": "curvature_per_pressure_1_m_kpa", "gap_extra": "gap_length_m"}
+_FOLDED = {
+    "gain": "curvature_per_pressure_1_m_kpa",
+    "gap_extra": "gap_length_m",
+    "flexibility": "bending_stiffness_n_m2",
+    "relaxation": "bending_relaxation_s",
+}
 _CONDITIONS = ("pressure_kpa", "frequency_hz", "tether")
 
 Values = Mapping[str, float]
@@ -63,31 +68,43 @@ class Model:
 
     Effects are compiled in three groups, by their hooks: none (or none that the equations must hold), those
     that leave the actuators linear, and all. So calibration is fast, and whatever a search combines is
-    compiled once.
+    compiled once. Where the robot or an effect is soft, the same groups stand in the compliant model.
 
     Parameters
     ----------
     robot : Robot
         Bench values; effects that the robot file names are part of the model, at the file's values where
         nothing else is asked.
-    model : {"complex", "simplified"}
+    model : {"complex", "simplified", "compliant"}, optional
+        Default: what the robot file asks for. Under a rigid one a stiffness of the robot does not count.
+
+    Raises
+    ------
+    InputError
+        If the compliant model is asked for a robot without a stiffness.
     """
 
-    def __init__(self, robot: Robot, model: str = "complex") -> None:
-        self.robot = robot
-        links = robot.links
+    def __init__(self, robot: Robot, model: str | None = None) -> None:
+        self.robot, self.name = robot, model or robot.own_model
+        if self.name == "compliant":
+            Structure.of(robot, self.name)
+        self._bends = self.name == "compliant" and robot.has_stiffness
+        rigid, links = "complex" if self.name == "compliant" else self.name, robot.links
         effects = tuple(all_effects().values())
         linear = tuple(e for e in effects if not e.nonlinear_actuator)
-        self.structures = tuple(
-            Structure(model, links, robot.friction_law, _occurrences(group))
-            for group in ((), linear, effects)
+        groups = [_occurrences(group) for group in ((), linear, effects)]
+        self.rigid, self.soft = (
+            tuple(Structure(m, links, robot.friction_law, group) for group in groups)
+            for m in (rigid, "compliant")
         )
-        self._levels = (frozenset[str](), frozenset(_occurrences(linear)), frozenset(_occurrences(effects)))
-        self.full = self.structures[-1]
+        self._levels = tuple(frozenset(group) for group in groups)
+        self.full = self.soft[-1]
         self.links, self.segments = links, links - 1
         self.names = _layout(self.full, self.full)
         index = {name: i for i, name in enumerate(self.names)}
-        self._kept = tuple(np.array([index[n] for n in _layout(s, self.full)]) for s in self.structures)
+        self._kept = {
+            s: np.array([index[n] for n in _layout(s, self.full)]) for s in (*self.rigid, *self.soft)
+        }
         self.forms = tuple(f for e in effects for f in forms_of(e, links))
         own = [(form_of_entry(e), e) for e in robot.effects]
         self.own: dict[str, float] = {}
@@ -99,7 +116,8 @@ class Model:
         defaults = {**dict.fromkeys(self._names, 0.0), **starts, **self.own}
         self._defaults = np.array([defaults[name] for name in self._names])
         robot_names = self._names[: len(self._names) - len(starts)]
-        self._bench = np.array([getattr(robot, name) for name in robot_names])
+        self._bench = np.array([getattr(robot, n) or COMPLIANCE_PARAMETERS.get(n, 0.0) for n in robot_names])
+        self._bending = {c.name for f in self.forms if f.effect.bends for c in f.sizes[:1]}
 
     def structure(
         self, values: Values, coordinates: Sequence[Coordinate] = ()
@@ -112,7 +130,22 @@ class Model:
         present = {name.split(".")[0] for name, v in both.items() if "." in name and v != 0}
         present = (present | {c.effect for c in coordinates}) & self._levels[2]
         level = next(k for k, effects in enumerate(self._levels) if present <= effects)
-        return self.structures[level], self._kept[level]
+        structure = (self.soft if self.is_soft(values) else self.rigid)[level]
+        return structure, self._kept[structure]
+
+    @property
+    def can_bend(self) -> bool:
+        """Whether effects may make the body bend under load: the simplified model has no such body."""
+        return self.name != "simplified"
+
+    def is_soft(self, values: Values) -> bool:
+        """Return whether the body bends under load at `values`."""
+        asked = self.can_bend and any({**self.own, **values}.get(n, 0.0) for n in self._bending)
+        return self._bends or asked
+
+    def softens(self, coordinate: Coordinate, values: Values) -> bool:
+        """Return whether a body that is rigid at `values` begins to bend along `coordinate`."""
+        return coordinate.name in self._bending and self.can_bend and not self.is_soft(values)
 
     def pack(self, values: Values, conditions: Conditions) -> Packed:
         """Return the numbers for the equations at `values`."""
@@ -201,6 +234,12 @@ def _functions(
                 robot[_FOLDED["gain"]] *= effect.gain(e, now[1])
             if effect.gap_extra:
                 robot[_FOLDED["gap_extra"]] += effect.gap_extra(e)
+            if effect.flexibility:
+                stiffness = robot[_FOLDED["flexibility"]]
+                robot[_FOLDED["flexibility"]] = stiffness / (1 + stiffness * effect.flexibility(e))
+            if effect.relaxation:
+                own_time = robot[_FOLDED["relaxation"]]
+                robot[_FOLDED["relaxation"]] = ca.if_else(own_time > 0, own_time, effect.relaxation(e))
         delay = delay + effect.delay(e) if effect.delay else delay
         clock = clock + effect.clock(e) if effect.clock else clock
     p = [robot[n] for n in full.parameter_names]

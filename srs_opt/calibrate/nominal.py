@@ -13,11 +13,11 @@ from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait, Wave
 from srs_opt.measurement.records import Applied, Schedule, Trial
 from srs_opt.model.parameters import Structure
-from srs_opt.model.registry import build
+from srs_opt.model.registry import state_layout
+from srs_opt.model.state import StateLayout
 from srs_opt.simulate.integrate import step_kernel
 from srs_opt.simulate.kernel import Kernel
 from srs_opt.simulate.mesh import Mesh
-from srs_opt.simulate.rosenbrock import BODY_STATES
 from srs_opt.simulate.timeline import Timeline
 from srs_opt.simulate.together import Search, Stretch, Stretched, alone
 
@@ -43,8 +43,8 @@ class Nodes:
     body : array (n + 1, 6)
         Pose, then velocity in the robot's frame and yaw momentum.
     kappa, dkappa : array (n + 1, N-1)
-    memory : array (n + 1, M)
-        Memory holds the variables of hysteresis-like effects, one after the other; none where none acts.
+    start : array (nx,)
+        The whole state at the first node.
     valve : array (n, N-1)
         Held over each step.
     p, camera : array
@@ -57,7 +57,7 @@ class Nodes:
     body: np.ndarray
     kappa: np.ndarray
     dkappa: np.ndarray
-    memory: np.ndarray
+    start: np.ndarray
     valve: np.ndarray
     p: np.ndarray
     camera: np.ndarray
@@ -161,11 +161,15 @@ class TrialRun:
             valves.append(piece.valve[:, mesh.phase])
             steps.append(mesh.h_s)
         return _nodes(
-            np.concatenate(states, axis=1), np.concatenate(valves, axis=1), np.concatenate(steps), packed
+            state_layout(structure),
+            np.concatenate(states, axis=1),
+            np.concatenate(valves, axis=1),
+            np.concatenate(steps),
+            packed,
         )
 
     def _start(self, structure: Structure, p: np.ndarray) -> np.ndarray:
-        x = np.zeros(BODY_STATES + build(structure)[2].states)
+        x = np.zeros(state_layout(structure).size)
         x[:3] = start_pose(self.model.full, p, self.trial.heading_rad)[0]
         return x
 
@@ -227,16 +231,15 @@ def _cycles(timeline: Timeline, period_s: float) -> list[Timeline]:
     return pieces
 
 
-def _nodes(states: np.ndarray, valve: np.ndarray, h_s: np.ndarray, packed: Packed) -> Nodes:
-    segments = valve.shape[0]
-    act = states[BODY_STATES:].T
-    kappa, dkappa = act[:, :segments], act[:, segments : 2 * segments]
+def _nodes(
+    layout: StateLayout, states: np.ndarray, valve: np.ndarray, h_s: np.ndarray, packed: Packed
+) -> Nodes:
     return Nodes(
         time_s=np.concatenate([[0.0], np.cumsum(h_s)]),
         body=states[:6].T,
-        kappa=kappa,
-        dkappa=dkappa,
-        memory=act[:, 2 * segments :],
+        kappa=states[layout.kappa].T,
+        dkappa=states[layout.dkappa].T,
+        start=states[:, 0],
         valve=valve.T,
         p=packed.p,
         camera=packed.camera,

@@ -13,7 +13,7 @@ from srs_opt.calibrate.coordinates import Coordinate
 from srs_opt.calibrate.mapped import evaluate, mapped
 from srs_opt.calibrate.model import Model, Values, camera_effects
 from srs_opt.calibrate.nominal import Nodes, conditions_of
-from srs_opt.calibrate.sensitivity import variation
+from srs_opt.calibrate.sensitivity import Variation, onset, variation
 from srs_opt.measurement.records import Trial
 from srs_opt.measurement.spots import Spots
 from srs_opt.model.kinematics import Chain, arc
@@ -21,6 +21,9 @@ from srs_opt.model.mechanics import Mechanics
 from srs_opt.model.parameters import Structure, effect_symbols
 from srs_opt.model.registry import build
 from srs_opt.simulate.compiled import compiled
+
+# of a typical flexibility: as stiff as that a body moves by 0.1 % other than to first order
+ONSET = 1e-3
 
 
 @dataclass(frozen=True)
@@ -157,7 +160,8 @@ def predict(
         return Prediction(points, slopes, pose, kappa)
     by = model.seeds(values, conditions_of(trial), coordinates)
     seeds = by.p[kept]
-    moving = np.flatnonzero(np.any(seeds != 0, axis=0))
+    softening = np.array([model.softens(c, values) for c in coordinates])
+    moving = np.flatnonzero(np.any(seeds != 0, axis=0) & ~softening)
     jac_pose = by_pose.reshape(frames, 3, seen).transpose(0, 2, 1)
     jac_kappa = by_kappa.reshape(frames, -1, seen).transpose(0, 2, 1)
     if moving.size:
@@ -169,6 +173,10 @@ def predict(
         touched = np.any(seeds != 0, axis=1) & np.any(by_p.reshape(frames, -1, seen) != 0, axis=(0, 2))
         part += jac_p[:, :, touched] @ seeds[touched][:, moving]
         slopes[:, :, moving] = part
+    for k in np.flatnonzero(softening):
+        began = _onset(model, trial, nodes, values, coordinates[int(k)])
+        slopes[:, :, k] = (jac_pose @ _linear(nodes.time_s, began.pose, at))[..., 0]
+        slopes[:, :, k] += (jac_kappa @ _linear(nodes.time_s, began.kappa, at))[..., 0]
     jac_camera = by_camera.reshape(frames, -1, seen).transpose(0, 2, 1)
     velocity = _velocity(nodes, rate, at)
     in_time = jac_pose @ velocity[0][..., None] + jac_kappa @ velocity[1][..., None]
@@ -177,6 +185,14 @@ def predict(
     shown = np.any(by.camera != 0, axis=0)
     slopes[:, :, shown] += jac_camera @ by.camera[:, shown]
     return Prediction(points, slopes, pose, kappa)
+
+
+def _onset(model: Model, trial: Trial, nodes: Nodes, values: Values, c: Coordinate) -> Variation:
+    """Return the sensitivities to a body's beginning to bend."""
+    ends = [{**values, c.name: share * ONSET * c.typical} for share in (0.5, 1.0)]
+    structure, kept = model.structure(ends[0])
+    flexible = tuple(model.pack(end, conditions_of(trial)).p[kept] for end in ends)
+    return onset(structure, nodes, flexible, 0.5 * ONSET * c.typical)
 
 
 @lru_cache(maxsize=8)

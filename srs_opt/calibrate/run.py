@@ -21,7 +21,7 @@ from srs_opt.robot import Robot
 
 def calibrate(
     dataset: DataSet,
-    model: str = "complex",
+    model: str | None = None,
     report: Callable[[str], None] | None = None,
     where: Executor = HERE,
 ) -> Calibration:

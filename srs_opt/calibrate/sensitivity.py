@@ -9,14 +9,14 @@ velocity.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from srs_opt.calibrate.nominal import Nodes
 from srs_opt.calibrate.start import start_pose
 from srs_opt.model.parameters import Structure
-from srs_opt.model.registry import build
+from srs_opt.model.registry import state_layout
 from srs_opt.simulate.integrate import step_kernel
 from srs_opt.simulate.kernel import LANES, Course, Kernel
 from srs_opt.simulate.rosenbrock import BODY_STATES
@@ -55,10 +55,8 @@ def variation(
     (K,) are the coordinates' typical sizes.
     """
     n, hair = structure.segments, HAIR * typical
-    start = np.zeros(BODY_STATES + build(structure)[2].states)
-    known = np.concatenate([nodes.body[0], [0.0], nodes.kappa[0], nodes.dkappa[0], nodes.memory[0]])
-    start[: known.size] = known
-    h = np.diff(nodes.time_s)
+    start, h = _start(structure, nodes), np.diff(nodes.time_s)
+    same = start.size == nodes.start.size
 
     def course(x: np.ndarray, q: np.ndarray) -> Course:
         return Course(x, h, nodes.valve, q)
@@ -69,14 +67,47 @@ def variation(
         x[:3] += off * turn
         courses.append(course(x, p + off * seed))
     # another structure integrates the actuators otherwise: what it makes of the nodes' motion comes first
-    if known.size != start.size:
+    if not same:
         courses.insert(0, course(start, p))
     moved = _motions(step_kernel(structure), courses, n)
-    if known.size == start.size:
+    if same:
         unmoved = np.concatenate([nodes.body[:, :3], nodes.kappa], axis=1)[..., None]
     else:
         unmoved, moved = moved[..., :1], moved[..., 1:]
     slopes = (moved - unmoved) / hair
+    return Variation(slopes[:, :3], slopes[:, 3:])
+
+
+def _start(structure: Structure, nodes: Nodes) -> np.ndarray:
+    """Return the state at the first node as `structure` has it: memories that are new there are empty."""
+    start = np.zeros(state_layout(structure).size)
+    known = min(start.size, nodes.start.size)
+    start[:known] = nodes.start[:known]
+    return start
+
+
+def onset(
+    structure: Structure, nodes: Nodes, flexible: tuple[np.ndarray, np.ndarray], difference: float
+) -> Variation:
+    """Return the sensitivities of a rigid body's motion to the flexibility with which it begins to bend.
+
+    To first order in the flexibility F the curvature lags the no-load one by d with t_r d' + d = F M, M the
+    bending moment. Two bodies so stiff that nothing else is left, on the steps of the rigid one (the steps
+    are implicit, of full order for bends that follow their load at once), differ by just that.
+
+    Parameters
+    ----------
+    structure : Structure
+        Of the compliant model.
+    flexible : pair of array
+        Its packed parameters for two flexibilities, `difference` apart.
+    """
+    layout = state_layout(structure)
+    rigid = replace(layout, compliant=False, actuator_states=nodes.start.size - BODY_STATES)
+    start, h = layout.adopt(nodes.start, rigid), np.diff(nodes.time_s)
+    courses = [Course(start, h, nodes.valve, p) for p in flexible]
+    moved = _motions(step_kernel(structure), courses, structure.segments)
+    slopes = (moved[..., 1:] - moved[..., :1]) / difference
     return Variation(slopes[:, :3], slopes[:, 3:])
 
 

@@ -112,7 +112,7 @@ class Trials:
 
     def __reduce__(self) -> tuple[object, ...]:
         """Travel without the compiled model and without what was found."""
-        model = self.model.robot, self.model.full.model
+        model = self.model.robot, self.model.name
         trials = tuple(self._trials.values())
         return _restored, (*model, trials, self.sd_m, self.tolerance_m_s, self.keeps)
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from srs_opt.command import (
     Answer,
     Parser,
+    add_model,
     make_parser,
     one_thread_of_linear_algebra,
     run_command,
@@ -64,7 +65,7 @@ def build_parser() -> Parser:
         help="robot file to go on from (an earlier corrected_robot.yaml): its effects are part of the model, "
         "refitted where they have a deviation; bench values stay the data set's own",
     )
-    parser.add_argument("--model", choices=("complex", "simplified"), default="complex", help="dynamic model")
+    add_model(parser)
     return parser
 
 

@@ -76,15 +76,15 @@ def _motion(orbit: Orbit) -> str:
 
 
 def payoff(
-    found: Discrepancy, model: str = "complex", tell: Callable[[str], None] = lambda message: None
+    found: Discrepancy, model: str | None = None, tell: Callable[[str], None] = lambda message: None
 ) -> Payoff | None:
     """Return what the named effects change; None where none was named, or where a robot has no gait.
 
     Parameters
     ----------
     found : Discrepancy
-    model : {"complex", "simplified"}
-        With which it was found.
+    model : {"complex", "simplified", "compliant"}, optional
+        With which it was found; a robot that bends under load takes the compliant model.
     tell : callable
         Gets messages about the progress.
     """
@@ -95,9 +95,9 @@ def payoff(
     try:
         gaits = [_fastest(robot, model, tell) for robot in (before, after)]
         return Payoff(
-            steady_gait(before, gaits[0], model),
-            steady_gait(after, gaits[0], model),
-            steady_gait(after, gaits[1], model),
+            steady_gait(before, gaits[0], _model_of(before, model)),
+            steady_gait(after, gaits[0], _model_of(after, model)),
+            steady_gait(after, gaits[1], _model_of(after, model)),
             tuple(room_effects(after)),
             before,
             after,
@@ -107,7 +107,11 @@ def payoff(
         return None
 
 
-def _fastest(robot: Robot, model: str, tell: Callable[[str], None]) -> Gait:
+def _model_of(robot: Robot, model: str | None) -> str:
+    return robot.own_model if robot.is_soft or model is None else model
+
+
+def _fastest(robot: Robot, model: str | None, tell: Callable[[str], None]) -> Gait:
     tell(f"optimizing the fastest gait of '{robot.name}'{' with its effects' if robot.effects else ''}")
-    problem = CycleProblem((robot,), model, Goal("speed"), Limits().for_robot(robot))
+    problem = CycleProblem((robot,), _model_of(robot, model), Goal("speed"), Limits().for_robot(robot))
     return search(problem, starts=STARTS).gait

@@ -86,7 +86,7 @@ def find_discrepancy(
     dataset: DataSet,
     effects: Sequence[str] | None = None,
     *,
-    model: str = "complex",
+    model: str | None = None,
     seed: int = 0,
     where: Executor = HERE,
     report: Callable[[str], None] | None = None,
@@ -98,7 +98,9 @@ def find_discrepancy(
     dataset : DataSet
     effects : sequence of str, optional
         Names to consider; default all that are known.
-    model : {"complex", "simplified"}
+    model : {"complex", "simplified", "compliant"}, optional
+        Default: compliant where the robot file has a stiffness, else complex. An effect that makes a rigid
+        body bend is fitted with the compliant model.
     seed : int
     where : Executor
         Who simulates the trials (`srs_opt.parallel.executor`); the answer does not depend on it.
@@ -115,7 +117,7 @@ def find_discrepancy(
     trials = (*split.open, *split.sealed, *quick)
     groups = split.open, quick, split.sealed
     experiment = Experiment(Model(dataset.robot, model), trials, sd, dataset.bench, where, groups)
-    candidates = _candidates(dataset, effects)
+    candidates = _candidates(dataset, effects, experiment.model)
     search = Search(experiment, fitted_coordinates(dataset.robot), candidates, split.open, seed, tell, quick)
     return _examine(dataset, search, split, tell, started, restricted=effects is not None)
 
@@ -186,10 +188,11 @@ def _explained_without(search: Search, null: Examined, odd: Sequence[str]) -> bo
     return without.examine(found).detection.p_value >= DETECTED
 
 
-def _candidates(dataset: DataSet, effects: Sequence[str] | None) -> tuple[Candidate, ...]:
+def _candidates(dataset: DataSet, effects: Sequence[str] | None, model: Model) -> tuple[Candidate, ...]:
     found = all_candidates(dataset.robot.links, effects)
     present = {Candidate(form_of_entry(e)).label for e in dataset.robot.effects}
-    return tuple(c for c in found if c.label not in present)
+    fitting = [c for c in found if model.can_bend or not c.form.effect.bends]
+    return tuple(c for c in fitting if c.label not in present)
 
 
 def _not_testable(

@@ -91,7 +91,7 @@ def derivatives(chain: BendingChain, y: ca.SX, dy: ca.SX, ddy: ca.SX, drive: Dri
     mass = chain.model.mass
     net = [slopes.force[0] - mass * motion.acceleration[0], slopes.force[1] - mass * motion.acceleration[1]]
     spring = _springs(chain)
-    relaxation = chain.model.parameters["bending_relaxation_s"]
+    relaxation = chain.model.relaxation()
     turning = _turning_levers(motion.segments, chain.joint_forces(*net))
     power_v = _Loads.of(slopes.power_by_velocity)
     power_r = _Loads.of(slopes.power_by_place)

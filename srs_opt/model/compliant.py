@@ -4,8 +4,8 @@ The actuators (13)-(15) give the no-load curvature kappa0; a segment answers wit
 
     Q_i = (EI/l) [l kappa0_i - q_i + t_r (l kappa0_i' - q_i')],
 
-conjugate to q_i. EI is that of the chamber and the gap's spring in series, t_r the material's relaxation
-time. EI to infinity is the complex model (8).
+conjugate to q_i. EI is that of the chamber, the gap's spring and effects in series, t_r the material's
+relaxation time. EI to infinity is the complex model (8).
 """
 
 from __future__ import annotations
@@ -31,15 +31,25 @@ class CompliantModel(ComplexModel):
         self.no_load_rate = ca.SX.sym("no_load_rate", self.links - 1)
 
     def stiffness(self) -> ca.SX:
-        """Return EI of a segment, N m^2: chamber and gap in series, 1/EI + L_o/(l EI_gap)."""
+        """Return EI of a segment, N m^2: chamber, gap and effects in series, 1/EI + L_o/(l EI_gap) + ..."""
         p = self.parameters
-        gap = self.gap_length / (p["segment_length_m"] * p["gap_stiffness_n_m2"])
-        return 1 / (1 / p["bending_stiffness_n_m2"] + gap)
+        flexibility = self.gap_length / (p["segment_length_m"] * p["gap_stiffness_n_m2"])
+        flexibility = flexibility + 1 / p["bending_stiffness_n_m2"]
+        for effect, e in p.effects:
+            flexibility = flexibility + effect.flexibility(e) if effect.flexibility else flexibility
+        return 1 / flexibility
+
+    def relaxation(self) -> ca.SX:
+        """Return the material's relaxation time, s: the robot's, else an effect's."""
+        found = own = self.parameters["bending_relaxation_s"]
+        for effect, e in self.parameters.effects:
+            found = ca.if_else(own > 0, own, effect.relaxation(e)) if effect.relaxation else found
+        return found
 
     def moment(self, kappa: ca.SX, dkappa: ca.SX, no_load: ca.SX, no_load_rate: ca.SX) -> ca.SX:
         """Return the bending moments Q, N m, conjugate to l kappa, (N-1, 1)."""
-        relaxation = self.parameters["bending_relaxation_s"]
-        return self.stiffness() * (no_load - kappa + relaxation * (no_load_rate - dkappa))
+        slack = no_load - kappa + self.relaxation() * (no_load_rate - dkappa)
+        return self.stiffness() * slack
 
     def elastic_energy(self) -> ca.SX:
         """Return the energy stored in the segments, J: sum l EI (kappa0 - kappa)^2 / 2."""
@@ -54,9 +64,8 @@ class CompliantModel(ComplexModel):
 
     def material_loss(self) -> ca.SX:
         """Return the power lost in the material, W: sum l EI t_r (kappa0' - kappa')^2."""
-        p = self.parameters
         rate = ca.sumsqr(self.no_load_rate - self.dkappa)
-        return p["segment_length_m"] * self.stiffness() * p["bending_relaxation_s"] * rate
+        return self.parameters["segment_length_m"] * self.stiffness() * self.relaxation() * rate
 
     def kinetic_energy(self, velocity: ca.SX) -> ca.SX:
         """Return the kinetic energy, J, for the body velocity (u_x, u_y, yaw momentum)."""

@@ -28,8 +28,13 @@ ROBOT_PARAMETERS = (
     "tau1_s",
     "tau2_s",
 )
-COMPLIANCE_PARAMETERS = ("bending_stiffness_n_m2", "bending_relaxation_s", "gap_stiffness_n_m2")
 _RIGID_N_M2 = 1e15  # what is absent: below rounding beside any stiffness, and with finite derivatives
+# values where the robot file says nothing; no relaxation time means that of an effect
+COMPLIANCE_PARAMETERS = {
+    "bending_stiffness_n_m2": _RIGID_N_M2,
+    "bending_relaxation_s": 0.0,
+    "gap_stiffness_n_m2": _RIGID_N_M2,
+}
 GAIT_PARAMETERS = ("pressure_kpa", "frequency_hz")
 
 
@@ -162,8 +167,7 @@ class Parameters:
         """Return the numbers for `robot` under one pressure and frequency, shape (n,)."""
         values: list[float] = [float(getattr(robot, name)) for name in ROBOT_PARAMETERS]
         if self.structure.compliant:
-            given = (getattr(robot, name) for name in COMPLIANCE_PARAMETERS)
-            values += [_RIGID_N_M2 if value is None else value for value in given]
+            values += [getattr(robot, n) or default for n, default in COMPLIANCE_PARAMETERS.items()]
         values += [pressure_kpa, frequency_hz]
         specs = dynamic_effects(robot, room=True)
         if [s["name"] for s in specs if not _placed(s)] != [

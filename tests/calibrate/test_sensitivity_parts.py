@@ -39,7 +39,7 @@ def test_the_small_structure_gives_the_slopes_of_the_full_one(setting):
     for coordinates in (base, (*base, *effects)):
         structure, kept = model.structure(start.values, coordinates)
         found.append(variation(structure, nodes, nodes.p[kept], seeds[kept], typical, trial.heading_rad))
-    assert structure == model.full
+    assert structure == model.rigid[-1]
     # linear actuators are integrated exactly, those with all effects to the order of the scheme
     assert found[0].pose == pytest.approx(found[1].pose, rel=1e-4, abs=1e-5)
     assert found[0].kappa == pytest.approx(found[1].kappa, rel=1e-3, abs=1e-3)
@@ -61,7 +61,7 @@ def test_differences_are_the_tangents_of_the_integration(setting, effects):
     typical = np.array([c.typical for c in coordinates])
     found = variation(structure, nodes, nodes.p[kept], seeds, typical, trial.heading_rad)
     kernel, n = tangent_kernel(structure), structure.segments
-    state = np.concatenate([nodes.body[0], [0.0], nodes.kappa[0], nodes.dkappa[0], nodes.memory[0]])
+    state = nodes.start
     h = np.diff(nodes.time_s)
     inputs = np.column_stack([nodes.valve, np.zeros(h.size)])
     for k in range(len(coordinates)):

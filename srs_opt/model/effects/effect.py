@@ -62,6 +62,8 @@ class Effect:
     rolling_factor, skidding_factor : hooks (e, speed); multiply the Coulomb term along, across.
     rolling_force : hook (e, speed along the wheel); extra force along the wheel (N).
     link_force : hook (e, LinkState); forces (fx, fy) on the links in the robot's frame.
+    flexibility, relaxation : hooks (e); added to 1/EI of the segments (1/(N m^2), which makes the bends
+        coordinates of their own); the material's relaxation time where the robot has none (s).
     gain, bias : hooks (e, frequency) and (e); factor on C0, offset of the curvature target (1/m).
     slow_down : hook (e, valve, kappa); factor on both time constants.
     restoring : hook (e, kappa, memory); added to the restoring curvature.
@@ -88,6 +90,8 @@ class Effect:
     skidding_factor: Callable[[Symbols, ca.SX], ca.SX] | None = None
     rolling_force: Callable[[Symbols, ca.SX], ca.SX] | None = None
     link_force: Callable[[Symbols, LinkState], tuple[ca.SX, ca.SX]] | None = None
+    flexibility: Callable[[Symbols], ca.SX] | None = None
+    relaxation: Callable[[Symbols], ca.SX] | None = None
     gain: Callable[[Symbols, ca.SX], ca.SX] | None = None
     bias: Callable[[Symbols], ca.SX] | None = None
     slow_down: Callable[[Symbols, ca.SX, ca.SX], ca.SX] | None = None
@@ -112,6 +116,11 @@ class Effect:
     def hooks(self) -> frozenset[str]:
         """Names of the hooks that it has."""
         return frozenset(name for name in HOOKS if getattr(self, name) is not None)
+
+    @property
+    def bends(self) -> bool:
+        """Whether it makes the body bend under load, which takes the compliant model."""
+        return self.flexibility is not None
 
     @property
     def in_equations(self) -> bool:
