@@ -120,7 +120,7 @@ def make(options: argparse.Namespace) -> dict[str, object]:
 
     from virtual_lab.dataset import Recording, truth_file, write_dataset
     from virtual_lab.draw import draw_truth
-    from virtual_lab.robot_file import RobotFile, read_robot
+    from virtual_lab.robot_file import WPI_SRS, read_robot
     from virtual_lab.trials import design
     from virtual_lab.truth import Scatter
 
@@ -135,7 +135,7 @@ def make(options: argparse.Namespace) -> dict[str, object]:
         options.effect,
         np.random.default_rng([options.seed, 4]),
         (options.scale, options.scale) if options.scale is not None else (0.7, 1.4),
-        robot=read_robot(options.robot) if options.robot is not None else RobotFile(),
+        robot=read_robot(options.robot) if options.robot is not None else WPI_SRS,
         bench_error=options.bench_error,
         scatter=Scatter(0.0, 0.0, 0.0) if options.no_scatter else Scatter(),
     )

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from virtual_lab.catalogue import EffectKind, find_kind
-from virtual_lab.robot_file import RobotFile
+from virtual_lab.robot_file import WPI_SRS, RobotFile
 from virtual_lab.truth import USUAL_SCATTER, Scatter, Truth
 
 BENCH_SD: Mapping[str, float] = {
@@ -53,7 +53,7 @@ def draw_truth(
     rng: np.random.Generator,
     scale_range: tuple[float, float] = (0.7, 1.4),
     *,
-    robot: RobotFile = RobotFile(),
+    robot: RobotFile = WPI_SRS,
     bench_error: float = 1.0,
     scatter: Scatter = USUAL_SCATTER,
 ) -> Truth:

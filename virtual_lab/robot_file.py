@@ -42,6 +42,9 @@ class RobotFile:
     other: Mapping[str, Any] = field(default_factory=lambda: {"name": "WPI SRS"})
 
 
+WPI_SRS = RobotFile()
+
+
 def read_robot(path: Path) -> RobotFile:
     """Read a robot file.
 

@@ -66,7 +66,7 @@ def test_gap_springs_are_in_series_with_the_chambers():
 def test_step_on_the_ground_loses_what_an_independent_program_says():
     truth = Truth(Parameters(bending_stiffness_n_m2=0.005), friction_speed_m_s=1e-4)
     readings = {}
-    for name, segment, condition, _, time, kappa in step_rows(
+    for _, segment, condition, _, time, kappa in step_rows(
         truth, np.random.default_rng(0), Instruments(curvature_sd_1_m=0.0), (62.0,)
     ):
         if segment == 2 and float(time) >= 0.5:
