@@ -28,7 +28,8 @@ def build_parser() -> Parser:
         "Fit friction, curvature per pressure and time constants to all trials of a data set at once, bench\n"
         "values as priors; write robot.yaml with estimates and relative standard deviations.\n"
         "JSON: parameters and sd (SI units, pressure in kPa), unidentifiable (directions the data say\n"
-        "nothing about), misfit {before, after} (root mean square over the noise), data (tracks or maps)\n"
+        "nothing about), misfit {before, after} (root mean square over the noise), warnings (values more\n"
+        "than three standard deviations from the bench), data (tracks or maps)\n"
         "and, from maps alone, sd_with_tracks (what tracks of the same gaits would leave; else null).",
         "python -m srs_opt.calibrate data/my_set --json",
         robot=False,
@@ -65,6 +66,7 @@ def _record(found: Calibration) -> dict[str, object]:
         "sd": found.sd,
         "unidentifiable": list(found.unidentifiable),
         "misfit": {"before": found.before, "after": found.after},
+        "warnings": list(found.warnings),
         "data": "tracks" if found.sd_with_tracks is None else "maps",
         "sd_with_tracks": found.sd_with_tracks,
         "correlation": {
@@ -80,6 +82,7 @@ def _summary(found: Calibration) -> str:
     lines.append(f"misfit over noise: {found.before:.3f} -> {found.after:.3f}")
     if found.unidentifiable:
         lines.append("the data say nothing about: " + "; ".join(found.unidentifiable))
+    lines += [f"warning: {text}" for text in found.warnings]
     if found.sd_with_tracks is not None:
         lines.append("from maps alone; 8 s of track of every gait would know better by the factor")
         less = {n: sd / found.sd_with_tracks[n] for n, sd in found.sd.items()}

@@ -106,6 +106,12 @@ class Fit:
     start_misfit_ratio: float = math.nan
 
     @property
+    def off_bench(self) -> dict[str, float]:
+        """By how many of its deviations each of the robot's values lies from its bench value."""
+        robot = (c for c in self.coordinates if not c.effect and c.reported and math.isfinite(c.prior_sd))
+        return {c.name: (self.point.values[c.name] - c.start) / c.prior_sd for c in robot}
+
+    @property
     def sd(self) -> dict[str, float]:
         """Standard deviations by coordinate."""
         return {c.name: float(s) for c, s in zip(self.coordinates, np.sqrt(np.diag(self.covariance)))}

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from srs_opt.calibrate.coordinates import Coordinate
 from srs_opt.calibrate.fit import Fit
 from srs_opt.robot import Robot
 
+OFF_BENCH = 3.0  # standard deviations of the bench; by chance one value in 370 lies further off
 BLIND = 0.9  # posterior over prior deviation above which the data told nothing
 
 
@@ -32,6 +34,8 @@ class Calibration:
         Directions about which the data say no more than the bench did.
     before, after : float
         Root mean square misfit over the noise, at the bench values and at the estimates.
+    off_bench : mapping
+        By how many of its deviations each value lies from its bench value.
     sd_with_tracks : dict or None
         For a calibration from maps alone: the deviations that tracks of the same gaits would leave.
     """
@@ -43,7 +47,23 @@ class Calibration:
     unidentifiable: tuple[str, ...]
     before: float
     after: float
+    off_bench: Mapping[str, float] = field(default_factory=dict)
     sd_with_tracks: dict[str, float] | None = None
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a reader should not overlook: values far from where the bench had them."""
+        return bench_warnings(self.off_bench)
+
+
+def bench_warnings(off_bench: Mapping[str, float]) -> tuple[str, ...]:
+    """Return a line for every value that lies further from its bench value than the bench can be wrong."""
+    return tuple(
+        f"{name} lies {abs(off):.1f} standard deviations {'above' if off > 0 else 'below'} its bench value: "
+        "the bench is wrong, or the value makes up for something that the model lacks"
+        for name, off in off_bench.items()
+        if abs(off) > OFF_BENCH
+    )
 
 
 def calibrated_robot(robot: Robot, fit: Fit) -> Robot:
@@ -76,6 +96,7 @@ def calibration(robot: Robot, fit: Fit, before: float, after: float) -> Calibrat
         unidentifiable([fit.coordinates[i] for i in index], covariance),
         before,
         after,
+        fit.off_bench,
     )
 
 

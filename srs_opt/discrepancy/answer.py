@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from srs_opt.calibrate.candidates import effect_spec, entry_sd, with_sd
-from srs_opt.calibrate.result import calibrated_robot
+from srs_opt.calibrate.result import bench_warnings, calibrated_robot
 from srs_opt.discrepancy.examined import needed_gain
 from srs_opt.discrepancy.hypothesis import Hypothesis
 from srs_opt.discrepancy.pipeline import Discrepancy
@@ -31,6 +31,7 @@ def answer(found: Discrepancy, robot_file: Path | None) -> dict[str, Any]:
         ],
         "gap": _gap(found, speaks),
         "next_experiment": _next(found),
+        "warnings": _warnings(found),
         "candidates": candidate_rows(found),
         "corrected_robot": str(robot_file) if robot_file else None,
         "seconds": round(found.seconds, 2),
@@ -62,6 +63,12 @@ def _gap(found: Discrepancy, speaks: bool) -> dict[str, Any] | None:
         "interval": list(gap.interval) if speaks and gap.interval else None,
         "trials": gap.trials,
     }
+
+
+def _warnings(found: Discrepancy) -> list[str]:
+    """Return which values lie far from the bench, in the model that is answered with."""
+    chosen = found.best if found.believed else found.null
+    return [] if chosen is None else list(bench_warnings(chosen.hypothesis.fit.off_bench))
 
 
 def _next(found: Discrepancy) -> dict[str, Any] | None:

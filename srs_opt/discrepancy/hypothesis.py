@@ -80,13 +80,9 @@ class Hypothesis:
 
     def against_the_bench(self) -> str:
         """Return which calibrated value would lie far from its bench value; empty when none."""
-        for coordinate in self.fit.coordinates:
-            if np.isfinite(coordinate.prior_sd) and not coordinate.effect and not coordinate.fixed:
-                off = (self.fit.point.values[coordinate.name] - coordinate.start) / coordinate.prior_sd
-                if abs(off) > FAR:
-                    return (
-                        f"{coordinate.name} would lie {abs(off):.1f} standard deviations from its bench value"
-                    )
+        for name, off in self.fit.off_bench.items():
+            if abs(off) > FAR:
+                return f"{name} would lie {abs(off):.1f} standard deviations from its bench value"
         return ""
 
     def specs(self) -> list[dict[str, Any]]:

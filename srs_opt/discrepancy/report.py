@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from srs_opt.calibrate.result import bench_warnings
 from srs_opt.discrepancy.examined import Examined
 from srs_opt.discrepancy.pictures import pictures
 from srs_opt.discrepancy.pipeline import Discrepancy
@@ -121,6 +122,10 @@ def caveats(found: Discrepancy) -> list[str]:
             f"{found.sd_m * 1e3:.2f} mm, which is what was used."
         )
     notes += [f"Trial {name} was left out: {why}." for name, why in found.split.left_out]
+    if found.null is not None:
+        notes += [f"Of calibration alone: {w}." for w in bench_warnings(found.null.hypothesis.fit.off_bench)]
+    if found.best is not None and found.best.hypothesis.candidates:
+        notes += [f"With the effects: {w}." for w in bench_warnings(found.best.hypothesis.fit.off_bench)]
     if found.gap is not None and found.gap.trials < 5:
         notes.append(f"Only {found.gap.trials} trials were sealed: the interval of the gap is wide.")
     if found.best is not None and found.verdict.word in (NAMED, ONE_OF) and not found.best.adequate:
