@@ -59,8 +59,8 @@ CASES = (
 def run(quick: bool) -> Section:
     rows = [_few()] if quick else [_answered(case) for case in CASES]
     notes = [
-        "Built-in robot, 1-2 Hz, 41-55 kPa, four starts. Best known: CMA-ES over all unknowns of a wave, many "
-        "restarts, from another program.",
+        "Built-in robot, 1-2 Hz, 41-55 kPa, four starts. Best known: CMA-ES over all unknowns of a wave, "
+        "many restarts, from another program.",
     ]
     return Section("Gait optimization: answers", COLUMNS, rows, notes)
 

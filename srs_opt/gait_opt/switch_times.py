@@ -10,12 +10,15 @@ from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait
 from srs_opt.gait_opt.collocation.explain import explained
 from srs_opt.gait_opt.collocation.guess import gait_from, switches_of, unknowns_from_orbits
+from srs_opt.gait_opt.collocation.layout import WEIGHTS, Mesh
 from srs_opt.gait_opt.collocation.phases import Cuts, exchanged, phase_cuts, phase_times, switch_order
 from srs_opt.gait_opt.collocation.problem import CycleProblem
+from srs_opt.gait_opt.collocation.program import Program
 from srs_opt.gait_opt.collocation.refine import defects, refined_cuts
 from srs_opt.gait_opt.ladder import Report, Rung, Step, bounded, elements_until, orbits_of
 from srs_opt.gait_opt.prices import Price, prices
 from srs_opt.gait_opt.score import Score, score
+from srs_opt.orbit.motion import STRAIGHT_RADIUS_M
 from srs_opt.orbit.steady import Orbit
 
 # the start is near: let the barrier begin low and push nothing off its limits
@@ -23,6 +26,7 @@ _IPOPT = {
     "mu_strategy": "monotone", "mu_init": 1e-6, "bound_push": 1e-6, "bound_frac": 1e-6, "max_iter": 100,
     "tol": 1e-5,
 }  # fmt: skip
+_MOTION = ("speed", "turn_rate")
 _ROUNDS = 6
 _ELEMENTS = 90
 _MOST_ELEMENTS = 160
@@ -92,6 +96,55 @@ def optimize_switch_times(
     return Polished(gait, orbits, best, claimed, tuple(steps), cost)
 
 
+def collocated_speeds(problem: CycleProblem, gait: Gait) -> tuple[float, ...] | None:
+    """Return the robots' speeds by collocation with the gait held; None where that does not converge.
+
+    On phases between switches, so that ticks are no obstacle; what is wanted of the gait does not enter.
+    """
+    orbits = orbits_of(problem, gait)
+    order = switch_order(_switches(gait))
+    cuts = phase_cuts(_switches(gait), order, *elements_until(orbits, _MOST_ELEMENTS))
+    mesh, times = phase_times(_switches(gait), order, cuts)
+    p = problem.program(mesh.elements, times)
+    z, scales = unknowns_from_orbits(p.layout, list(problem.robots), list(orbits), mesh)
+    z[p.layout.merit] = score(problem, gait, orbits).merit
+    parameters = problem.parameters(p, mesh, scales, max(r.friction_speed_m_s for r in problem.robots))
+    (low, high), (row_low, row_high) = problem.bounds(p)
+    held = slice(0, 2 + p.layout.switches)
+    free = [p.layout.unknown(r, name) for r in range(len(orbits)) for name in _MOTION]
+    low[held] = high[held] = z[held]
+    low[free], high[free] = -np.inf, np.inf
+    wishes = slice(row_low.size - len(p.goal.names), None)
+    merits = np.array(p.goal.names) == "merit"
+    row_low[wishes], row_high[wishes] = np.where(merits, 0.0, -np.inf), np.inf
+    rows = (row_low, row_high)
+    solution = p.solve(z, parameters, (low, high), rows, options=_IPOPT, solver=problem.solver)
+    if not solution.converged:
+        return None
+    return _path_speeds(problem, p, solution.z, scales, mesh)
+
+
+def _path_speeds(
+    problem: CycleProblem, p: Program, z: np.ndarray, scales: list[np.ndarray], mesh: Mesh
+) -> tuple[float, ...]:
+    """Return the robots' speeds as simulation defines them: turn rate times mean distance from the centre.
+
+    The program's own speed is that of the mean place in the turning frame, whose distance from the centre is
+    smaller than the mean distance where the body swings about as far as the radius of its turn.
+    """
+    weights = (np.diff(mesh.edges)[:, None] * WEIGHTS).ravel()
+    speeds = []
+    for r in range(len(problem.robots)):
+        speed, turn = (float(z[p.layout.unknown(r, name)]) for name in _MOTION)
+        if abs(turn) * STRAIGHT_RADIUS_M > abs(speed):
+            states = z[p.layout.states(r)].reshape(p.layout.points, -1) * scales[r]
+            ahead, aside = states[:, 4], states[:, 5]
+            distance = float(weights @ np.hypot(ahead, aside - speed / turn))
+            speed = float(np.copysign(abs(turn) * distance, speed))
+        speeds.append(speed)
+    return tuple(speeds)
+
+
 def _switches(gait: Gait) -> np.ndarray:
     return switches_of(gait, gait.intervals[0][0][0])
 
@@ -125,7 +178,7 @@ def _solve(
     unknowns, rows, binding = bounded(problem, p, z, reach)
     solution = p.solve(z, parameters, unknowns, rows, options=_IPOPT, solver=problem.solver)
     trial = gait_from(p.layout, solution.z)
-    speeds = tuple(float(solution.z[p.layout.unknown(r, "speed")]) for r in range(len(problem.robots)))
+    speeds = _path_speeds(problem, p, solution.z, scales, mesh)
     defect = defects(p, solution, parameters, mesh)
     step = Step(
         Rung(own, mesh.elements, reach), speeds[0], speeds[0], solution.iterations,

@@ -23,6 +23,7 @@ from srs_opt.gait_opt.population import evolved
 from srs_opt.gait_opt.reach import refuse_contradictions
 from srs_opt.gait_opt.report import summary, wave_parameters
 from srs_opt.gait_opt.search import Where, search
+from srs_opt.gait_opt.switch_times import collocated_speeds
 from srs_opt.orbit.steady import integrator, steady_gait
 from srs_opt.robot import wpi_srs
 from srs_opt.simulate.integrate import Integrator
@@ -219,6 +220,15 @@ def test_certificate_finds_faults():
         assert fault in words
     tight = CycleProblem((ROBOT,), "complex", Goal(), Limits(min_dwell_s=0.2499))
     assert certify(tight, leaned(gait, 0.05), (0.2,))[0].dwell_ok is False
+
+
+def test_collocation_of_a_held_gait_agrees_with_simulation():
+    """Also where it is no optimum, turns, and stands on coarse ticks."""
+    tight = Wave(1.458, 55.0, (0.3, 1.2, 1.95, 2.9), (0.9, 0.5, 0.6, 0.8)).gait()
+    gait = on_ticks(tight, 0.02)
+    assert steady_gait(ROBOT, gait).radius_m < 0.15
+    speeds = collocated_speeds(CycleProblem((ROBOT,), "complex", Goal("pivot"), Limits()), gait)
+    assert speeds == pytest.approx([steady_gait(ROBOT, gait).speed_m_s], rel=5e-3)
 
 
 def test_periodicity_gap_sees_a_motion_that_is_not_periodic():
