@@ -21,7 +21,18 @@ def track_of(trial: Trial) -> np.ndarray | None:
 
 
 def noise_sd_m(dataset: DataSet) -> float:
-    """Return the noise per coordinate, robustly; what the data set states when there are too few frames."""
+    """Return the noise per coordinate that a fit of independent samples is to assume.
+
+    The white part is estimated from the tracks; one that the data set states to be correlated in time adds
+    the white noise with the same spectral density at frequencies below 1/correlation_s, where motion is:
+    exponentially correlated noise has 2 sd^2 tau there, white noise of n samples a second sd^2/n.
+    """
+    correlated = 2 * dataset.correlated_sd_m**2 * dataset.correlation_s * dataset.rate_hz
+    return float(np.hypot(_white_sd_m(dataset), np.sqrt(correlated)))
+
+
+def _white_sd_m(dataset: DataSet) -> float:
+    """Return the white part, robustly; what the data set states when there are too few frames."""
     found = []
     for trial in dataset.trials:
         track = track_of(trial)

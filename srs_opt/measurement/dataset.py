@@ -99,6 +99,8 @@ def _header(dataset: DataSet) -> str:
     import yaml
 
     camera = {"rate_hz": float(dataset.rate_hz), "marker_sd_m": float(dataset.marker_sd_m)}
+    if dataset.correlated_sd_m:
+        camera |= {k: float(getattr(dataset, k)) for k in ("correlated_sd_m", "correlation_s")}
     spots = next((t.spots for t in dataset.trials if t.spots is not None), None)
     markers = dataset.markers if spots is None else [spot.record() for spot in spots]
     record = {"name": dataset.name, "robot": "robot.yaml", "camera": camera, "markers": markers}

@@ -40,6 +40,7 @@ TRIAL_COLUMNS = (
     "heading_rad",
     "duration_s",
 )
+CAMERA_KEYS = ("rate_hz", "marker_sd_m", "correlated_sd_m", "correlation_s")
 OPTIONAL_TRIAL_COLUMNS = ("schedule", "tether", "floor", "replicate_of", "kind", "start")
 
 
@@ -53,6 +54,8 @@ class Header:
     marker_sd_m: float
     markers: str
     spots: Spots | None = None
+    correlated_sd_m: float = 0.0
+    correlation_s: float = 0.0
 
 
 def read_folder(folder: Path, report: Report) -> DataSet | None:
@@ -77,6 +80,8 @@ def read_folder(folder: Path, report: Report) -> DataSet | None:
         maps=maps,
         bench=bench,
         folder=folder,
+        correlated_sd_m=header.correlated_sd_m,
+        correlation_s=header.correlation_s,
     )
 
 
@@ -96,6 +101,7 @@ def _read_header(folder: Path, report: Report) -> Header:
     robot = _read_robot(folder, str(record.get("robot", "robot.yaml")), fields, report)
     rate = fields.number(("camera", "rate_hz"), 1e-3, 1e5, "frames per second")
     sd = fields.number(("camera", "marker_sd_m"), 1e-9, robot.pitch_m / 3, "metres (found millimetres?)")
+    correlated, correlation = _correlated_noise(fields, robot)
     markers, spots = record.get("markers", TAIL_TO_HEAD), None
     if isinstance(markers, list):
         found, problems = spots_of(document, ("markers",), robot.links)
@@ -107,7 +113,22 @@ def _read_header(folder: Path, report: Report) -> Header:
         fields.error(("markers",), f"{words}, found {str(markers)[:40]!r}")
         markers = TAIL_TO_HEAD
     name = record.get("name", folder.resolve().name)
-    return Header(str(name), robot, rate, sd, str(markers), spots)
+    return Header(str(name), robot, rate, sd, str(markers), spots, correlated, correlation)
+
+
+def _correlated_noise(fields: _Fields, robot: Robot) -> tuple[float, float]:
+    """Return deviation (m) and correlation time (s) of the camera's coloured noise, 0 and 0 without."""
+    places = ("camera", "correlated_sd_m"), ("camera", "correlation_s")
+    camera = fields.record.get("camera")
+    given = [isinstance(camera, dict) and key in camera for _, key in places]
+    if not any(given):
+        return 0.0, 0.0
+    if not all(given):
+        missing = places[given.index(False)]
+        fields.error(missing, "missing; correlated noise takes both correlated_sd_m and correlation_s")
+        return 0.0, 0.0
+    sd = fields.number(places[0], 0.0, robot.pitch_m / 3, "metres (found millimetres?)")
+    return sd, fields.number(places[1], 0.0, 1e4, "seconds")
 
 
 class _Fields:
@@ -126,8 +147,8 @@ class _Fields:
                 self.error((str(key),), unknown_word("key", str(key), list(known)))
         camera = self.record.get("camera")
         for key in camera if isinstance(camera, dict) else ():
-            if key not in ("rate_hz", "marker_sd_m"):
-                self.error(("camera", str(key)), unknown_word("key", str(key), ["rate_hz", "marker_sd_m"]))
+            if key not in CAMERA_KEYS:
+                self.error(("camera", str(key)), unknown_word("key", str(key), list(CAMERA_KEYS)))
 
     def number(self, place: tuple[str, str], low: float, high: float, unit: str) -> float:
         table = self.record.get(place[0])

@@ -227,6 +227,8 @@ class DataSet:
     bench : Bench
     folder : Path or None
         Where it was read from.
+    correlated_sd_m, correlation_s : float
+        Of the camera's noise that is correlated in time (exponentially), beside the white one; 0 without.
     """
 
     name: str
@@ -238,6 +240,8 @@ class DataSet:
     maps: tuple[MapRow, ...] = ()
     bench: Bench = field(default_factory=Bench)
     folder: Path | None = None
+    correlated_sd_m: float = 0.0
+    correlation_s: float = 0.0
 
     def trial(self, name: str) -> Trial:
         """Return the trial called `name`."""
