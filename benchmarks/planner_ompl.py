@@ -20,7 +20,7 @@ from planners.generate.areas import corridor
 from planners.maze.places import RobotSize
 from planners.plan.certify import certify
 from planners.search.follow import follow, reference_along
-from planners.search.ompl_geometric import curves_of, poses_along, strip_setup
+from planners.search.ompl_geometric import STEP, curves_of, poses_along, strip_setup
 from planners.search.ompl_setup import seeded
 from planners.search.problem import Problem
 
@@ -59,7 +59,10 @@ def ompl_runs(ratio: float, count: int, limit_s: float) -> list[Run]:
     )
     benchmark.benchmark(request)
     _, runs = recorded(benchmark)
-    return [(name.removeprefix("k"), *run, passed) for (name, *run), passed in zip(runs, certified)]
+    return [
+        (name.removeprefix("k"), time, exact, right, passed)
+        for (name, time, exact, right), passed in zip(runs, certified)
+    ]
 
 
 def _certified(problem: Problem, planner: Any) -> bool:
@@ -67,7 +70,7 @@ def _certified(problem: Problem, planner: Any) -> bool:
     definition = planner.getProblemDefinition()
     if not definition.hasExactSolution():
         return False
-    path = poses_along(definition.getSolutionPath())
+    path = poses_along(definition.getSolutionPath(), STEP * problem.robot.length_m)
     way = None if path is None else follow(problem, reference_along(problem, path))
     return way is not None and certify(problem, tuple(step.gait for step in way)).passed
 

@@ -25,10 +25,11 @@ from srs_opt.robot import Robot
 from srs_opt.simulate.timeline import Timeline
 
 Array = NDArray[np.float64]
-ASTRAY_M = 0.06  # farther from the plan than this: plan anew
-STOP_CLEARANCE_M = -0.004  # a cycle that should by table run deeper into a wall than this is not begun
-LEAST_ROOM_M = 0.001  # foreseen, below which a halt is the better choice
-ON_TRACK = (0.004, 0.004, 0.03, 0.04)  # off the plan's place (m), heading (rad), speed (m/s): it is played on
+# Lengths in body lengths, speeds in body lengths per second.
+ASTRAY = 0.254  # farther from the plan than this: plan anew
+STOP_CLEARANCE = -0.0169  # a cycle that should by table run deeper into a wall than this is not begun
+LEAST_ROOM = 0.00424  # foreseen, below which a halt is the better choice
+ON_TRACK = (0.0169, 0.0169, 0.03, 0.169)  # off the plan's place (x, y), heading (rad), speed: it is played on
 MOST_TRIED = 8  # gaits, before a cycle is given up
 MOST_IDLE = 4  # cycles without progress along the plan
 MOST_REPLANS = 8
@@ -183,8 +184,10 @@ class Drive:
 
     def _next_gait(self) -> int | None:
         choice = self._choice()
-        lost = choice.astray_m > ASTRAY_M or self.idle >= MOST_IDLE
-        if (lost or choice.clearance_m < STOP_CLEARANCE_M) and self.replans < MOST_REPLANS:
+        lost = choice.astray_m > ASTRAY * self.problem.robot.length_m or self.idle >= MOST_IDLE
+        if (
+            lost or choice.clearance_m < STOP_CLEARANCE * self.problem.robot.length_m
+        ) and self.replans < MOST_REPLANS:
             self.replans += 1
             why = "strayed or stuck" if lost else "nothing fits"
             self.tell(f"cycle {len(self.played)}: {why}, planning anew")
@@ -192,7 +195,7 @@ class Drive:
                 return None  # it cannot be planned in motion: halt first
             if self._plan_anew():
                 choice = self._choice()
-        if choice.clearance_m < STOP_CLEARANCE_M:
+        if choice.clearance_m < STOP_CLEARANCE * self.problem.robot.length_m:
             return None
         self.predicted = choice.displacement
         return choice.gait
@@ -210,12 +213,12 @@ class Drive:
         if planned is not None and self._room_m(self.state, planned) > enough_m:
             return by_plan(self.problem, where, self.learned, planned)
         tried: list[Choice] = []
-        second, most_m = None, LEAST_ROOM_M
+        second, most_m = None, LEAST_ROOM * self.problem.robot.length_m
         while len(tried) < MOST_TRIED:
             barred = [choice.gait for choice in tried]
             choice = choose(self.problem, self.reference, where, self.learned, self.node, barred)
             tried.append(choice)
-            if choice.clearance_m < STOP_CLEARANCE_M:
+            if choice.clearance_m < STOP_CLEARANCE * self.problem.robot.length_m:
                 break
             room_m = self._room_m(self.state, choice.gait)
             if room_m > enough_m:
@@ -233,7 +236,8 @@ class Drive:
         """Return the gait that the plan plays next, if the robot is as the plan has it after a cycle."""
         off = np.abs(state[:4] - self.ends[:-1])
         off[:, 2] = np.abs((off[:, 2] + math.pi) % (2 * math.pi) - math.pi)
-        off = (off / ON_TRACK).max(axis=1)
+        length = self.problem.robot.length_m
+        off = (off / (np.array(ON_TRACK) * (length, length, 1.0, length))).max(axis=1)
         off[self.gaits_before[:-1] != self.before] = math.inf
         cycle = int(off.argmin())
         return self.plan.gaits[cycle] if off[cycle] < 1 else None

@@ -20,14 +20,16 @@ from planners.search.problem import Problem
 from planners.search.tree import arrival_index
 
 Array = NDArray[np.float64]
-PLACE_M, COURSE_RAD, SPEED_M_S = 0.02, 0.15, 0.6  # deviations that cost one unit each
+# Lengths in body lengths, speeds in body lengths per second.
+PLACE, COURSE_RAD, SPEED = 0.0847, 0.15, 2.54  # deviations that cost one unit each
 UNIT_S = 0.1  # time that costs one unit: a robot slower than its plan must not creep along it
-AIR_M, AIR_UNITS = 0.015, 4.0  # below this clearance it costs, up to so many units at contact
-CONTACT_M, CONTACT_UNITS = 0.0005, 100.0
+AIR, AIR_UNITS = 0.0636, 4.0  # below this clearance it costs, up to so many units at contact
+CONTACT, CONTACT_UNITS = 0.00212, 100.0
 CHANGE_UNITS = 0.05
 HORIZON, BEAM = 3, 5
 NODES_PER_CYCLE = 6
-BEYOND_M = 0.12  # past the goal
+BEYOND = 0.508  # past the goal
+SLOWEST = 0.424  # with which the time for that is reckoned
 LEARNING = 0.3
 LEAST_WAY_M = 0.005  # a cycle that should go less far teaches nothing
 _THIN = 3  # every third sample of a cycle is looked at
@@ -147,18 +149,19 @@ def reference_of(problem: Problem, plan: Plan) -> Reference:
     cycle = np.minimum(np.searchsorted(ends, times, side="right") - 1, len(plan.gaits) - 1)
     speed = np.where(backwards[cycle], -speed, speed)
     pose = np.stack([x, y, np.interp(times, ends, course)], axis=1)
-    return _beyond(Reference(pose, speed, c.time_s[-1] - times, np.array(plan.gaits)[cycle]))
+    reference = Reference(pose, speed, c.time_s[-1] - times, np.array(plan.gaits)[cycle])
+    return _beyond(reference, problem.robot.length_m)
 
 
-def _beyond(reference: Reference) -> Reference:
+def _beyond(reference: Reference, length_m: float) -> Reference:
     """Return the reference drawn out straight past its end, so that the goal is driven through."""
     x, y, course = reference.pose[-1]
     speed = float(reference.speed_m_s[-1])
-    far = math.copysign(1.0, speed) * np.linspace(0.0, BEYOND_M, 6)[1:]
+    far = math.copysign(1.0, speed) * np.linspace(0.0, BEYOND * length_m, 6)[1:]
     line = np.stack(
         [x + far * math.cos(course), y + far * math.sin(course), np.full(far.size, course)], axis=1
     )
-    later = -np.abs(far) / max(abs(speed), 0.1)
+    later = -np.abs(far) / max(abs(speed), SLOWEST * length_m)
     return Reference(
         np.concatenate([reference.pose, line]),
         np.append(reference.speed_m_s, np.full(far.size, speed)),
@@ -229,22 +232,22 @@ def _grow(
     )
     speed = move.speed_m_s * learned.stretches(len(move.speed_m_s))
     place = np.concatenate([pose[:, -1, :2], (pose[:, -1, 2] + motion.course[:-1])[:, None]], axis=1)
-    offset = _offset(reference, place, speed)
+    offset = _offset(reference, place, speed, problem.robot.length_m)
     order = np.argsort(offset, kind="stable")[: 3 * BEAM]
     order = np.union1d(order, _planned(reference, where.pose))  # which nothing may resemble
     order = order[motion.allowed[where.gait, order]]
     if branch.first is None:
         order = np.setdiff1d(order, list(barred))
     lines = body_in_room(motion.body[where.gait, order, 1::_THIN], pose[order, 1::_THIN])
-    room = _room(problem, lines)
+    room, length = _room(problem, lines), problem.robot.length_m
     grown = []
     for gait, clearance in zip(map(int, order), map(float, room)):
         arrival = arrival_index(problem.goal, pose[gait])
         part = 1.0 if arrival is None else arrival / SAMPLES
-        lack = min(max(1 - clearance / AIR_M, 0.0), 1.0)
+        lack = min(max(1 - clearance / (AIR * length), 0.0), 1.0)
         cost = branch.cost + AIR_UNITS * lack**2 + CHANGE_UNITS * (gait != where.gait)
         cost += part * float(motion.period_s[gait]) / UNIT_S
-        cost += CONTACT_UNITS * (1 + lack) if clearance <= CONTACT_M else 0.0
+        cost += CONTACT_UNITS * (1 + lack) if clearance <= CONTACT * length else 0.0
         first = branch.first or Choice(gait, local[gait, -1], clearance, 0.0)
         after = Where(pose[gait, -1], gait, float(speed[gait]))
         ahead = float(offset[gait]) if arrival is None else 0.0
@@ -262,16 +265,16 @@ def _room(problem: Problem, lines: Array) -> Array:
     """Return the clearance (gaits,) of bodies (gaits, samples, points, 2), exact where it is small."""
     flat = lines.reshape(-1, *lines.shape[2:])
     room = problem.body.estimate(flat)
-    close = room < AIR_M + problem.field.error_m
+    close = room < AIR * problem.robot.length_m + problem.field.error_m
     if close.any():
         room[close] = problem.body.exact(flat[close])
     return np.asarray(room.reshape(lines.shape[:2]).min(axis=1))
 
 
-def _offset(reference: Reference, place: Array, speed: Array) -> Array:
+def _offset(reference: Reference, place: Array, speed: Array, length_m: float) -> Array:
     """Return what places (n, 3) with speeds (n,) cost: deviation from the plan and time to go."""
     dx, dy, turn = (place[:, None, :] - reference.pose[None]).transpose(2, 0, 1)
     turn = (turn + math.pi) % (2 * math.pi) - math.pi
-    off = (dx**2 + dy**2) / PLACE_M**2 + (turn / COURSE_RAD) ** 2
-    off = off + ((speed[:, None] - reference.speed_m_s) / SPEED_M_S) ** 2
+    off = (dx**2 + dy**2) / (PLACE * length_m) ** 2 + (turn / COURSE_RAD) ** 2
+    off = off + ((speed[:, None] - reference.speed_m_s) / (SPEED * length_m)) ** 2
     return np.asarray((off + reference.left_s / UNIT_S).min(axis=1))

@@ -71,19 +71,28 @@ class DistanceField:
         return np.maximum(self.clearance(points) - self.error_m, 0.0)
 
     @classmethod
-    def of(cls, maze: Maze, resolution_m: float | None = None, max_nodes: int = MAX_NODES) -> DistanceField:
+    def of(
+        cls,
+        maze: Maze,
+        resolution_m: float | None = None,
+        max_nodes: int = MAX_NODES,
+        *,
+        finest_m: float = DEFAULT_RESOLUTION_M,
+    ) -> DistanceField:
         """Tabulate `maze`.
 
         Parameters
         ----------
         maze : Maze
         resolution_m : float, optional
-            Spacing of the nodes; by default 5 mm, or coarser in wide mazes. Taken larger where the
+            Spacing of the nodes; by default `finest_m`, or coarser in wide mazes. Taken larger where the
             table would exceed `max_nodes`, and fitted to the cells of an occupancy grid.
         max_nodes : int
             Bound on the number of nodes, which bounds memory.
+        finest_m : float
+            Finest spacing that is taken by default.
         """
-        spacing = _spacing(maze, resolution_m, max_nodes)
+        spacing = _spacing(maze, resolution_m, max_nodes, finest_m)
         columns = max(1, math.ceil(maze.width_m / spacing - 1e-9))
         rows = max(1, math.ceil(maze.height_m / spacing - 1e-9))
         origin = (maze.bounds[0] + spacing / 2, maze.bounds[1] + spacing / 2)
@@ -106,7 +115,7 @@ class DistanceField:
         return cls(values, origin, spacing, maze.bounds, node_error + _HALF_DIAGONAL * spacing + rounding)
 
 
-def _spacing(maze: Maze, wanted: float | None, max_nodes: int) -> float:
+def _spacing(maze: Maze, wanted: float | None, max_nodes: int, finest_m: float) -> float:
     """Return the node spacing in metres."""
     cell = maze.raster.cell_m if maze.raster is not None else None
 
@@ -114,7 +123,7 @@ def _spacing(maze: Maze, wanted: float | None, max_nodes: int) -> float:
         return max(math.sqrt(maze.width_m * maze.height_m / nodes), max(maze.width_m, maze.height_m) / nodes)
 
     if wanted is None:
-        wanted = max(DEFAULT_RESOLUTION_M, min(at_least(DEFAULT_NODES), cell or math.inf))
+        wanted = max(finest_m, min(at_least(DEFAULT_NODES), cell or math.inf))
     spacing = max(wanted, at_least(max_nodes))
     if cell is None:
         return spacing

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from planners.motion.bending import Bending
 from planners.motion.valves import Joints
 
+STILL = 0.25  # body widths per cycle; what moves less has no direction of travel
 SAMPLES = 16  # intervals per cycle at which pose and body are kept
 
 Array = NDArray[np.float64]
@@ -125,7 +126,7 @@ class MotionTable:
         dx, dy, turn = self.steady.T
         backwards = self.steady_speed_m_s < 0
         chord = np.arctan2(np.where(backwards, -dy, dy), np.where(backwards, -dx, dx))
-        moving = np.hypot(dx, dy) > 0.01
+        moving = np.hypot(dx, dy) > STILL * self.body_width_m
         return np.append(np.where(moving, chord - turn / 2, 0.0), 0.0)
 
     @cached_property

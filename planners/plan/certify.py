@@ -28,12 +28,13 @@ from srs_opt.simulate.integrate import Trajectory
 from srs_opt.simulate.shapes import centre_lines
 
 Array = NDArray[np.float64]
-TOLERANCE_M_S = 1e-5  # of the coarsest integration: half a metre per second errs by 0.1 mm in ten metres
+# Of the coarsest integration, body lengths per second: at two lengths per second it errs by 0.0004 in 40.
+TOLERANCE = 4.24e-5
 FINER = 16.0  # twice as many steps
 LEVELS = 5  # tolerances at most; the last errs by a micrometre in a hundred metres
 RATIO = 4.0  # of the errors of two levels at least; 15 to 113 was seen over 94 m. 2 would double the bound
 SHARE = 0.1  # of the clearance, that the bound may be
-EXACT_BELOW_M = 0.03  # of clearance; above, the table's lower bound will do
+EXACT_BELOW = 0.127  # body lengths of clearance; above, the table's lower bound will do
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,7 @@ class Certificate:
     lines : array (n, points, 2)
         Centre line of the body in the room.
     room_m : array (n,)
-        Clearance at those instants (a lower bound where it is above EXACT_BELOW_M), the error taken off.
+        Clearance at those instants (a lower bound where it is above EXACT_BELOW), the error taken off.
     cycle : int array (n,)
         Index of the cycle that each instant belongs to.
     states : tuple of arrays
@@ -116,6 +117,7 @@ class Certifier:
     def _played(self, gaits: Sequence[int], level: int) -> list[Trajectory]:
         """Return the trajectories of all cycles, integrated with a level's tolerance."""
         known = self._known[level]
+        coarsest = TOLERANCE * self.problem.robot.length_m
         same = 0
         while same < min(len(gaits), len(known.gaits)) and gaits[same] == known.gaits[same]:
             same += 1
@@ -124,7 +126,7 @@ class Certifier:
         before = gaits[same - 1] if same else self.root.gait
         for gait in gaits[same:]:
             timeline = self.problem.joints.timeline(before, gait, STAIR_S / FINER ** (level / 2))
-            played = self.problem.run.run(timeline, state, TOLERANCE_M_S / FINER**level)
+            played = self.problem.run.run(timeline, state, coarsest / FINER**level)
             cycles.append(self.problem.bent(played, before, gait))
             before, state = gait, cycles[-1].final
         self._known[level] = _Played(list(gaits), cycles)
@@ -213,8 +215,9 @@ def _joined(played: Sequence[Trajectory]) -> tuple[Array, Array, Array, NDArray[
     return np.concatenate(time), np.concatenate(pose), np.concatenate(kappa), cycle
 
 
-def clearances(problem: Problem, lines: Array, limit_m: float = EXACT_BELOW_M) -> Array:
+def clearances(problem: Problem, lines: Array, limit_m: float | None = None) -> Array:
     """Return the clearance of bodies (n, points, 2): exact below `limit_m`, a lower bound above."""
+    limit_m = EXACT_BELOW * problem.robot.length_m if limit_m is None else limit_m
     room = problem.body.estimate(lines) - problem.field.error_m
     close = room < limit_m
     if close.any():

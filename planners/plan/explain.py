@@ -18,8 +18,8 @@ from srs_opt.orbit.steady import steady_gait
 Array = NDArray[np.float64]
 NODES = 700_000
 HALVINGS = 14  # of the clearance range: 0.1 mm in a metre
-SPARE_M = 0.004
-SLOWEST_M_S = 0.01  # a gait slower than this is none
+SPARE = 0.1  # of the body's width
+SLOWEST = 0.0424  # body lengths per second; a gait slower than this is none
 WEAKER = (0.85, 0.7, 0.55, 0.4)  # pressures tried outside the table, relative to its slimmest gait
 
 
@@ -150,10 +150,12 @@ def no_body_fits(problem: Problem) -> bool:
 def narrower_than_any_gait(problem: Problem) -> bool:
     """Whether the widest route has a place clearly narrower than what the slimmest gait needs.
 
-    A thin gate can be passed with a little less than a gait's envelope; SPARE_M allows for that.
+    A thin gate can be passed with a little less than a gait's envelope; SPARE allows for that.
     """
     tightest = tightest_place(problem)
-    return tightest is None or tightest.width_m < gait_needs(problem)[0][1] - SPARE_M
+    return (
+        tightest is None or tightest.width_m < gait_needs(problem)[0][1] - SPARE * problem.robot.body_width_m
+    )
 
 
 def gait_needs(problem: Problem) -> tuple[tuple[str, float], ...]:
@@ -161,7 +163,7 @@ def gait_needs(problem: Problem) -> tuple[tuple[str, float], ...]:
     needs = [
         (entry.name, sum(entry.envelope_m) + 2 * problem.margin_m)
         for entry in problem.gaits.gaits
-        if abs(entry.speed_m_s) > SLOWEST_M_S
+        if abs(entry.speed_m_s) > SLOWEST * problem.robot.length_m
     ]
     return tuple(sorted(needs, key=lambda need: need[1]))
 
@@ -275,7 +277,7 @@ def _slimmest_outside(problem: Problem, name: str) -> float | None:
             orbit = steady_gait(problem.robot, gait, problem.gaits.model)
         except NoAnswerError:
             continue
-        if abs(orbit.speed_m_s) > SLOWEST_M_S:
+        if abs(orbit.speed_m_s) > SLOWEST * problem.robot.length_m:
             need = sum(orbit.envelope_m) + 2 * problem.margin_m
             slimmest = min(need, slimmest or math.inf)
     return slimmest

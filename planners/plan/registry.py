@@ -25,7 +25,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple
 
-from planners.plan.solve import LEAST_SLACK_M, LatticeSolver
+from planners.plan.solve import LEAST_SLACK, LatticeSolver
 from planners.search.lattice import LatticeSettings
 from planners.search.ompl_control import MakePlanner, as_ompl_planner, run_planner
 from planners.search.ompl_geometric import search_geometric
@@ -116,7 +116,7 @@ def _ours(solver: Callable[..., LatticeSolver], problem: Problem, effort: Effort
 
 def _fine(problem: Problem, **options: Any) -> LatticeSolver:
     """Return the search that tells places near walls apart more finely: slower, but it threads needles."""
-    settings = LatticeSettings(most_halvings=HALVINGS, by_heading=True, slack_m=LEAST_SLACK_M)
+    settings = LatticeSettings(most_halvings=HALVINGS, by_heading=True, slack=LEAST_SLACK)
     return LatticeSolver(problem, settings, beams=(), **options)
 
 

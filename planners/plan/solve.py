@@ -20,13 +20,13 @@ LOOK_FIRST = 100  # nodes before the widths are looked at
 TOO_NARROW = "no way with these gaits: even the widest route is too narrow for every gait of the table"
 BACK = 3  # cycles before a failure from where the way is searched again, more at every attempt
 ATTEMPTS = 12
-MORE_SLACK_M = 0.0005
+MORE_SLACK = 0.00212  # body lengths
 # Of the last search: what happens between the samples of a cycle is left to the certificate. Corridors with
-# half a millimetre to spare are found with it; not at first, as more plans then have to be mended.
-LEAST_SLACK_M = 0.0001
+# 0.2 % of a body length to spare are found with it; not at first, as more plans then have to be mended.
+LEAST_SLACK = 0.000424  # body lengths
 BEAM = BeamSettings()
 # what keeps hitting the posts of a narrow passage needs states told apart by millimetres
-FINE_BEAM = BeamSettings(width=40, cell_m=0.01, course_rad=0.05, slack_m=0.0002)
+FINE_BEAM = BeamSettings(width=40, cell=0.0424, course_rad=0.05, slack=0.000847)
 BEAMS = (BEAM, FINE_BEAM)
 
 
@@ -81,7 +81,7 @@ class LatticeSolver:
         self.kept: tuple[int, ...] = ()
         self.attempts, self.refined = 0, False
         self.ended = False  # nothing is left to look at
-        self.more_slack_m = 0.0
+        self.more_slack = 0.0
         self.search = self._search_from(self.begin)
 
     @property
@@ -128,11 +128,11 @@ class LatticeSolver:
 
     def _exhausted(self) -> str:
         """Say at what resolution nothing was found."""
-        s = self.settings
+        s, length = self.settings, self.problem.robot.length_m
         return (
-            f"nothing found at this resolution: states within {1e3 * s.cell_m:.0f} mm, "
-            f"{math.degrees(s.course_rad):.0f} deg and {s.speed_m_s:.2f} m/s of each other were taken for "
-            "one, so a way that only one of them has may have slipped through"
+            f"nothing found at this resolution: states within {1e3 * s.cell * length:.0f} mm, "
+            f"{math.degrees(s.course_rad):.0f} deg and {s.speed * length:.2f} m/s of each other were taken "
+            "for one, so a way that only one of them has may have slipped through"
         )
 
     def _too_narrow(self) -> bool:
@@ -157,10 +157,10 @@ class LatticeSolver:
                 s = self.settings
                 self.settings = replace(
                     s,
-                    cell_m=s.cell_m / 2,
+                    cell=s.cell / 2,
                     course_rad=s.course_rad / 2,
-                    speed_m_s=s.speed_m_s / 2,
-                    slack_m=LEAST_SLACK_M,
+                    speed=s.speed / 2,
+                    slack=LEAST_SLACK,
                     by_heading=True,
                 )
                 self.tell("nothing left at this resolution; looking again at half of it")
@@ -175,7 +175,7 @@ class LatticeSolver:
         here = self.begin
         if keep:
             here = Root(certificate.states[keep - 1], gaits[keep - 1], -ROUNDING_M)
-        self.more_slack_m += MORE_SLACK_M
+        self.more_slack += MORE_SLACK
         self._begin_again(gaits[:keep], here)
 
     def _begin_again(self, kept: tuple[int, ...], here: Root) -> None:
@@ -189,8 +189,8 @@ class LatticeSolver:
         """Return a new search, with the slack that certificates have asked for."""
         if self.beams:
             beam = self.beams[0]
-            return BeamSearch(self.problem, replace(beam, slack_m=beam.slack_m + self.more_slack_m), here)
-        settings = replace(self.settings, slack_m=self.settings.slack_m + self.more_slack_m)
+            return BeamSearch(self.problem, replace(beam, slack=beam.slack + self.more_slack), here)
+        settings = replace(self.settings, slack=self.settings.slack + self.more_slack)
         return LatticeSearch(self.problem, settings, here)
 
     def _answer(self, status: Status, reason: str | None, plan: Plan | None = None) -> PlanResult:

@@ -27,7 +27,7 @@ DOUBTFUL, STALLED = 3, 10  # cycles without coming nearer to the goal: in doubt,
 
 @dataclass(frozen=True)
 class BeamSettings:
-    """Width and resolution.
+    """Width and resolution; lengths in body lengths, speeds in body lengths per second.
 
     Attributes
     ----------
@@ -35,13 +35,13 @@ class BeamSettings:
         States that go on; without, few on a long way and more on a short one.
     brood : int
         Of one state, so many at most.
-    cell_m, course_rad, speed_m_s : float
+    cell, course_rad, speed : float
         Cells by which states are told apart: of two in a cell the cheaper goes on.
     change_s : float
         Price of changing gait.
     air_s : float
         Price of a cycle that just keeps the margin (none where a body width of air is left).
-    slack_m : float
+    slack : float
         Beyond the margin, for what happens between the samples of a cycle.
     by_heading : bool
         Estimate what is left by place, course and direction of travel.
@@ -49,12 +49,12 @@ class BeamSettings:
 
     width: int | None = None
     brood: int = 4
-    cell_m: float = 0.03
+    cell: float = 0.127
     course_rad: float = math.radians(15)
-    speed_m_s: float = 0.1
+    speed: float = 0.424
     change_s: float = 0.02
     air_s: float = 0.07
-    slack_m: float = 0.0005
+    slack: float = 0.00212
     by_heading: bool = False
 
 
@@ -169,12 +169,12 @@ class BeamSearch:
 
     def _taken(self, offer: _Offer, cycle: Cycle) -> int | None:
         """Keep a simulated cycle if it is clear and the cheapest to come here; None too where it arrives."""
-        s, state = self.settings, cycle.state
+        s, state, length = self.settings, cycle.state, self.problem.robot.length_m
         course = state[2] + self.problem.motion.course[offer.gait]
-        key = cell_of(state, course, s.cell_m, s.course_rad, s.speed_m_s)
+        key = cell_of(state, course, s.cell * length, s.course_rad, s.speed * length)
         if self._cheapest.get(key, math.inf) <= offer.spent:
             return None
-        slack = self.root_slack_m if offer.parent == 0 else s.slack_m
+        slack = self.root_slack_m if offer.parent == 0 else s.slack * length
         if not self.problem.body.keeps_margin(cycle.lines, slack + (cycle.tube_m if offer.parent else 0.0)):
             return None
         self._cheapest[key] = offer.spent

@@ -15,7 +15,7 @@ from srs_opt.gait_opt.table import GaitTable
 
 Array = NDArray[np.float64]
 NODES, MOST_NODES = 40_000, 1_500_000
-FINEST_M = 0.006
+FINEST = 0.3  # of half the body's width
 BLOCKED_S = 1e6
 COMFORT = 1.5  # times the reach of the fastest gait is room enough for every gait at full speed
 # neighbours up to a knight's move: paths at most 2.7 % too long
@@ -88,7 +88,7 @@ def cost_map(
     area = (xmax - xmin) * (ymax - ymin)
     blocked = 0.6 * half_width_m
     # finer than the blocked strip about the thinnest wall, so that no cell has nodes on both sides of it
-    spacing = min(max(math.sqrt(area / NODES), FINEST_M), 2 * blocked)
+    spacing = min(max(math.sqrt(area / NODES), FINEST * half_width_m), 2 * blocked)
     spacing = max(spacing, math.sqrt(area / MOST_NODES))
     columns, rows = (max(2, math.ceil(side / spacing)) for side in (xmax - xmin, ymax - ymin))
     x, y = xmin + spacing * (np.arange(columns) + 0.5), ymin + spacing * (np.arange(rows) + 0.5)

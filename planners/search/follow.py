@@ -11,7 +11,7 @@ from planners.search.problem import Problem
 from planners.search.tree import Step, arrival_index, at_rest
 
 Array = NDArray[np.float64]
-SPACING_M = 0.03  # between the nodes of a reference
+SPACING = 0.127  # body lengths between the nodes of a reference
 PATIENCE = 4.0  # times the cycles that the path should take
 CYCLE_S = 0.5
 
@@ -24,7 +24,7 @@ def reference_along(problem: Problem, path: Array) -> Reference:
     path = path[keep]
     steps, far = np.diff(path[:, :2], axis=0), np.hypot(*np.diff(path[:, :2], axis=0).T)
     along = np.concatenate([[0.0], np.cumsum(far)])
-    at = np.linspace(0.0, along[-1], max(2, int(along[-1] / SPACING_M)))
+    at = np.linspace(0.0, along[-1], max(2, int(along[-1] / (SPACING * problem.robot.length_m))))
     heading = np.interp(at, along, np.unwrap(path[:, 2]))
     x, y = np.interp(at, along, path[:, 0]), np.interp(at, along, path[:, 1])
     forward = np.cos(path[:-1, 2]) * steps[:, 0] + np.sin(path[:-1, 2]) * steps[:, 1] >= 0

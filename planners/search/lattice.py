@@ -22,13 +22,13 @@ from planners.search.tree import Root, Step, Tree, arrival_index, at_rest, cell_
 
 @dataclass(frozen=True)
 class LatticeSettings:
-    """Resolution and greed.
+    """Resolution and greed; lengths in body lengths, speeds in body lengths per second.
 
     Attributes
     ----------
-    cell_m, course_rad, speed_m_s : float
+    cell, course_rad, speed : float
         Cells by which nodes are told apart.
-    close_m, most_halvings : float, int
+    close, most_halvings : float, int
         A body nearer to a wall than this is told apart more finely: half the cell for every halving of its
         clearance, so many times at most.
     greed : float
@@ -37,21 +37,21 @@ class LatticeSettings:
         Price of changing gait.
     air_s : float
         Price of a cycle that just keeps the margin (none where a body width of air is left).
-    slack_m : float
+    slack : float
         Beyond the margin, for what happens between the samples of a cycle.
     by_heading : bool
         Estimate what is left by place, course and direction of travel.
     """
 
-    cell_m: float = 0.02
+    cell: float = 0.0847
     course_rad: float = math.radians(12)
-    speed_m_s: float = 0.12
-    close_m: float = 0.02
+    speed: float = 0.508
+    close: float = 0.0847
     most_halvings: int = 0
     greed: float = 3.0
     change_s: float = 0.05
     air_s: float = 0.3
-    slack_m: float = 0.0005
+    slack: float = 0.00212
     by_heading: bool = False
 
 
@@ -109,7 +109,7 @@ class LatticeSearch:
         if key in self._closed:
             return None
         # the start may be as near to a wall as it likes; no cycle may bring the body nearer than that
-        slack = self.root_slack_m if parent == 0 else self.settings.slack_m
+        slack = self.root_slack_m if parent == 0 else self.settings.slack * self.problem.robot.length_m
         if not self.problem.body.keeps_margin(cycle.lines, slack + (cycle.tube_m if parent else 0.0)):
             return None
         self._closed.add(key)
@@ -117,13 +117,16 @@ class LatticeSearch:
 
     def _key(self, cycle: Cycle, gait: int) -> tuple[int, ...]:
         """Return the cell of a state; with halvings, cells are smaller near walls: a millimetre decides."""
-        s, state = self.settings, cycle.state
+        s, state, length = self.settings, cycle.state, self.problem.robot.length_m
         finer = 0
         if s.most_halvings:
-            room = max(float(self.problem.body.estimate(cycle.lines[::2]).min()), 1e-3)
-            finer = min(max(math.ceil(math.log2(s.close_m / room)), 0), s.most_halvings)
+            room = float(self.problem.body.estimate(cycle.lines[::2]).min())
+            halvings = math.log2(s.close * length / max(room, s.close * length / 2**s.most_halvings))
+            finer = max(math.ceil(halvings), 0)
         course = state[2] + self.problem.motion.course[gait]
-        return finer, *cell_of(state, course, s.cell_m / 2**finer, s.course_rad / 2**finer, s.speed_m_s)
+        return finer, *cell_of(
+            state, course, s.cell * length / 2**finer, s.course_rad / 2**finer, s.speed * length
+        )
 
     def _propose(self, node: int) -> None:
         """Put the cycles that can follow a node on the list."""

@@ -19,7 +19,9 @@ from planners.search.problem import Problem
 from planners.search.tree import Step
 
 Array = NDArray[np.float64]
-STEP_M = 0.02  # between the poses at which a path is checked and given back
+STEP = 0.0847  # body lengths between the poses at which a path is checked and given back
+BEFORE = 0.636  # body lengths before the goal, from where the way to it gives the heading
+SLOWEST = 0.212  # body lengths per second; slower gaits do not make routes
 STRIP_POINTS = 7
 
 
@@ -38,13 +40,21 @@ class Curves:
 
 def curves_of(problem: Problem) -> tuple[Curves, Curves]:
     """Return a comfortable and a tight assumption, from the table's gaits."""
-    turning = [e for e in problem.gaits.gaits if e.radius_m is not None and e.speed_m_s > 0.05]
+    turning = [
+        e
+        for e in problem.gaits.gaits
+        if e.radius_m is not None and e.speed_m_s > SLOWEST * problem.robot.length_m
+    ]
     # of the calibrated drive
     radii = problem.drive.radius.value * np.array([abs(e.radius_m or 0.0) for e in turning])
     bands = np.array([sum(e.envelope_m) / 2 for e in turning])
     if not radii.size:
-        return (Curves(1.0, problem.robot.body_width_m),) * 2
-    slimmest = min(sum(e.envelope_m) / 2 for e in problem.gaits.gaits if abs(e.speed_m_s) > 0.05)
+        return (Curves(4.24 * problem.robot.length_m, problem.robot.body_width_m),) * 2
+    slimmest = min(
+        sum(e.envelope_m) / 2
+        for e in problem.gaits.gaits
+        if abs(e.speed_m_s) > SLOWEST * problem.robot.length_m
+    )
     easy = Curves(1.3 * float(radii.min()), float(np.median(bands)))
     return easy, Curves(float(radii.min()), max(slimmest, problem.robot.body_width_m / 2))
 
@@ -91,7 +101,7 @@ def geometric_path(
     path = setup.getSolutionPath()
     # the simplifier's rounds are counted, not timed
     geometric.PathSimplifier(info).reduceVertices(path, 50, 50, 0.5)
-    return poses_along(path)
+    return poses_along(path, STEP * problem.robot.length_m)
 
 
 def strip_setup(problem: Problem, kind: str, curves: Curves) -> Any:
@@ -115,19 +125,19 @@ def strip_setup(problem: Problem, kind: str, curves: Curves) -> Any:
     setup = geometric.SimpleSetup(space)
     setup.setStateValidityChecker(_strip_checker(problem, curves))
     info = setup.getSpaceInformation()
-    info.setStateValidityCheckingResolution(STEP_M / space.getMaximumExtent())
+    info.setStateValidityCheckingResolution(STEP * problem.robot.length_m / space.getMaximumExtent())
     start, goal = space.allocState(), space.allocState()
     _set(start, problem.start.x, problem.start.y, problem.start.heading)
     _set(goal, *_goal_pose(problem))
-    setup.setStartAndGoalStates(start, goal, 0.01)
+    setup.setStartAndGoalStates(start, goal, 0.0424 * problem.robot.length_m)
     return setup
 
 
-def poses_along(path: Any) -> Array | None:
-    """Return the poses (n, 3) of OMPL's path; None where it is not what it says."""
+def poses_along(path: Any, step_m: float) -> Array | None:
+    """Return the poses (n, 3), a step apart, of OMPL's path; None where it is not what it says."""
     if not path.check():  # some planners call paths exact that are not
         return None
-    path.interpolate(max(2, int(path.length() / STEP_M)))
+    path.interpolate(max(2, int(path.length() / step_m)))
     return np.array([[s.getX(), s.getY(), s.getYaw()] for s in path.getStates()])
 
 
@@ -153,7 +163,8 @@ def _goal_pose(problem: Problem) -> tuple[float, float, float]:
     """Return a pose in the goal: where the quickest way for a point arrives, and its heading there."""
     trail = [np.array([problem.start.x, problem.start.y])]
     turns = np.arange(0.0, 2 * math.pi, math.pi / 8)
-    circle = STEP_M * np.stack([np.cos(turns), np.sin(turns)], axis=1)
+    step_m = STEP * problem.robot.length_m
+    circle = step_m * np.stack([np.cos(turns), np.sin(turns)], axis=1)
     # downhill on the time to go; it falls by a step's worth at least, so this ends
     for _ in range(int(1e5)):
         around = trail[-1] + circle
@@ -162,7 +173,7 @@ def _goal_pose(problem: Problem) -> tuple[float, float, float]:
             break
         trail.append(following)
     last = trail[-1]
-    before = trail[max(0, len(trail) - 1 - round(0.15 / STEP_M))]
+    before = trail[max(0, len(trail) - 1 - round(BEFORE / STEP))]
     heading = problem.goal.heading
     if heading is None:
         heading = math.atan2(last[1] - before[1], last[0] - before[0])

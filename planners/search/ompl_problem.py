@@ -19,8 +19,8 @@ from planners.search.problem import Cycle, Problem
 from planners.search.tree import Tree, arrival_index, at_rest
 
 MOST_CYCLES = 6  # that one control is held
-SLACK_M = 0.0005
-FAR_M = 0.01  # what is not in the goal is at least so far from it
+SLACK = 0.00212  # body lengths beyond the margin, for what happens between the samples of a cycle
+FAR = 0.0424  # body lengths that what is not in the goal is at least away from it
 TOO_NEAR = -1
 
 
@@ -62,7 +62,7 @@ class Memory:
         (cycle,) = problem.simulate_all([(tree.cycle[number].state, before, gait)])
         if cycle is None:
             return TOO_NEAR
-        slack = problem.start_slack_m if number == 0 else SLACK_M + cycle.tube_m
+        slack = problem.start_slack_m if number == 0 else SLACK * problem.robot.length_m + cycle.tube_m
         if not problem.body.keeps_margin(cycle.lines, slack):
             return TOO_NEAR
         return self.add(number, gait, cycle)
@@ -214,7 +214,9 @@ def _goal(base: Any, info: Any, problem: Problem, memory: Memory) -> Any:
             number = int(state[1][0])
             if number in memory.arrived:
                 return 0.0
-            return FAR_M + float(problem.to_goal.at(memory.tree.cycle[max(number, 0)].pose[-1, :2]))
+            return FAR * problem.robot.length_m + float(
+                problem.to_goal.at(memory.tree.cycle[max(number, 0)].pose[-1, :2])
+            )
 
     return Arrived()
 

@@ -34,6 +34,7 @@ Array = NDArray[np.float64]
 ROUNDING_M = 1e-6
 # Of the shortest way, and body lengths more: longer detours are not looked at.
 DETOUR_TIMES, DETOUR_LENGTHS = 1.5, 16.0
+FIELD = 0.0212  # body lengths between the nodes of the distance field, where the maze is small enough
 STEP_S = 0.002  # errs by about 0.04 mrad per cycle
 
 
@@ -103,7 +104,7 @@ class Problem:
     @cached_property
     def field(self) -> DistanceField:
         """Distances to walls."""
-        return DistanceField.of(self.maze)
+        return DistanceField.of(self.maze, finest_m=FIELD * self.robot.length_m)
 
     @cached_property
     def body(self) -> BodyClearance:
