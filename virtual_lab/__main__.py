@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import json
 import math
 import os
@@ -72,6 +73,13 @@ def build_parser() -> argparse.ArgumentParser:
         metavar="X",
         help="errors of robot.yaml, in its own deviations (default 1)",
     )
+    add(
+        "--engine",
+        default="equations",
+        choices=("equations", "dart"),
+        help="what moves the body: the laboratory's equations, or a physics engine (extra 'judge'; default "
+        "equations)",
+    )
     add("--rate", type=_number, default=120.0, metavar="HZ", help="camera rate (default 120)")
     add("--noise", type=_number, default=0.001, metavar="M", help="noise per coordinate, m (default 0.001)")
     add(
@@ -101,10 +109,11 @@ def build_parser() -> argparse.ArgumentParser:
 
 
 def _list(options: argparse.Namespace) -> None:
-    from virtual_lab.catalogue import KINDS
+    from virtual_lab.catalogue import ENGINE_KINDS, KINDS
 
     table = {
-        k.name: {"typical": k.typical, "parameters": k.parameters, "listed": k.listed} for k in KINDS.values()
+        k.name: {"typical": k.typical, "parameters": k.parameters, "listed": k.listed}
+        for k in (*KINDS.values(), *ENGINE_KINDS.values())
     }
     if options.json:
         print(json.dumps(table))
@@ -139,6 +148,7 @@ def make(options: argparse.Namespace) -> dict[str, object]:
         bench_error=options.bench_error,
         scatter=Scatter(0.0, 0.0, 0.0) if options.no_scatter else Scatter(),
     )
+    truth = dataclasses.replace(truth, engine=options.engine)
     trials = design(
         options.design, np.random.default_rng([options.seed, 5]), truth.parameters.links, options.duration
     )

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from virtual_lab import kernel, soft
+from virtual_lab.catalogue import ENGINE_KINDS
 from virtual_lab.errors import LabError
 from virtual_lab.trials import Trial
 from virtual_lab.truth import Truth
@@ -56,11 +57,7 @@ def assemble(
     truth: Truth, trial: Trial, end_s: float, factors: Factors = NOMINAL, refine: float = 1.0
 ) -> Tables:
     """Return the tables for a run to `end_s`, with steps `refine` times finer than stability asks."""
-    hidden: Hidden = {}
-    for name, values in truth.hidden(tether=trial.tether):
-        if name in hidden:
-            raise LabError(f"effect '{name}' is hidden twice; add up its sizes instead")
-        hidden[name] = values
+    hidden = hidden_effects(truth, trial)
     links = link_table(truth, factors, hidden)
     ground = ground_table(truth, hidden)
     edges, sign = valve_table(truth, trial, end_s, hidden)
@@ -150,6 +147,18 @@ def fastest_bending(links: np.ndarray, pitch: np.ndarray, segments: np.ndarray) 
     free = mass[2:, 2:] - mass[2:, :2] @ np.linalg.solve(mass[:2, :2], mass[:2, 2:])
     spring = np.diag(segments[:, soft.LENGTH] * segments[:, soft.STIFFNESS])
     return 1.3 * float(np.max(np.linalg.eigvals(np.linalg.solve(free, spring)).real))
+
+
+def hidden_effects(truth: Truth, trial: Trial) -> Hidden:
+    """Return the effects at work in a trial, by name."""
+    hidden: Hidden = {}
+    for name, values in truth.hidden(tether=trial.tether):
+        if name in hidden:
+            raise LabError(f"effect '{name}' is hidden twice; add up its sizes instead")
+        if name in ENGINE_KINDS and truth.engine != "dart":
+            raise LabError(f"effect '{name}' needs --engine dart")
+        hidden[name] = values
+    return hidden
 
 
 def link_table(truth: Truth, factors: Factors, hidden: Hidden) -> np.ndarray:

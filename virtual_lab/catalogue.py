@@ -21,6 +21,8 @@ Those in no list:
 - lopsided_chambers: C0 times 1 + ratio to the left, 1 - ratio to the right (in the sign of the command);
 - long_segment: one chamber longer by the share `extra`; payload: a mass on one link;
 - lens_barrel: image times 1 + per_m2 r^2; rolling_shutter: link i is seen (i - 1) delay_s late;
+- with --engine dart only: seized_wheel (a wheel that does not turn: its tyre slides), loose_wheel (one that
+  slides along its axle by play_m to either side);
 - swaying_camera: image shifted by amplitude sin(2 pi f t) along `direction`; clock_drift: t (1 + per_s).
 """
 
@@ -138,6 +140,12 @@ _UNLISTED = (
 LISTED: dict[str, EffectKind] = {kind.name: kind for kind in _LISTED}
 UNLISTED: dict[str, EffectKind] = {kind.name: kind for kind in _UNLISTED}
 KINDS: dict[str, EffectKind] = {**LISTED, **UNLISTED}
+# in no list either, and only where trials run in the physics engine
+_ENGINE = (
+    _unlisted("seized_wheel", "seized link", 1.0, False, "wheels"),
+    _unlisted("loose_wheel", "play_m link", 0.002, False, "wheels"),
+)
+ENGINE_KINDS: dict[str, EffectKind] = {kind.name: kind for kind in _ENGINE}
 
 
 def find_kind(name: str) -> EffectKind:
@@ -148,13 +156,14 @@ def find_kind(name: str) -> EffectKind:
     LabError
         There is none; the message suggests the nearest name.
     """
-    if name not in KINDS:
+    known = {**KINDS, **ENGINE_KINDS}
+    if name not in known:
         import difflib
 
-        near = difflib.get_close_matches(name, KINDS, n=1)
-        hint = f"; did you mean '{near[0]}'?" if near else f"; known: {', '.join(KINDS)}"
+        near = difflib.get_close_matches(name, known, n=1)
+        hint = f"; did you mean '{near[0]}'?" if near else f"; known: {', '.join(known)}"
         raise LabError(f"no effect is called '{name}'{hint}")
-    return KINDS[name]
+    return known[name]
 
 
 def check_effect(effect: Mapping[str, object], links: int) -> dict[str, float]:

@@ -67,6 +67,10 @@ def run(
     LabError
         The effects contradict each other or the robot.
     """
+    if truth.engine == "dart":
+        from virtual_lab.in_engine import run_in_engine
+
+        return run_in_engine(truth, trial, np.asarray(times, dtype=float), factors)
     order, back = np.unique(np.asarray(times, dtype=float), return_inverse=True)
     end_s = max(float(order[-1]), 0.0) + 1e-3
     tables = assemble(truth, trial, end_s, factors, refine)

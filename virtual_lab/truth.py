@@ -11,6 +11,7 @@ from virtual_lab.catalogue import check_effect, find_kind
 from virtual_lab.errors import LabError
 
 MIN_LINKS, MAX_LINKS = 3, 64
+ENGINES = ("equations", "dart")
 
 
 @dataclass(frozen=True)
@@ -88,6 +89,8 @@ class Truth:
         How well the robot file claims to know each value.
     documented : mapping
         What else the robot file says.
+    engine : {"equations", "dart"}
+        What moves the body: the laboratory's equations of motion, or a physics engine.
     """
 
     parameters: Parameters = DOCUMENTED
@@ -98,6 +101,7 @@ class Truth:
     bench: Parameters | None = None
     relative_sd: Mapping[str, float] = field(default_factory=dict)
     documented: Mapping[str, Any] = field(default_factory=lambda: {"name": "WPI SRS", "effects": []})
+    engine: str = "equations"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "effects", tuple(dict(e) for e in self.effects))
@@ -108,6 +112,8 @@ class Truth:
                 if find_kind(effect["name"]).listed is not listed:
                     place = "effects" if not listed else "unlisted"
                     raise LabError(f"effect '{effect['name']}' belongs under '{place}'")
+        if self.engine not in ENGINES:
+            raise LabError(f"engine must be one of {', '.join(ENGINES)}, found '{self.engine}'")
         if not self.friction_speed_m_s > 0:
             raise LabError(f"friction_speed_m_s must be above 0, found {self.friction_speed_m_s!r}")
 
