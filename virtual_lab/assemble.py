@@ -256,6 +256,7 @@ def bend_table(truth: Truth, hidden: Hidden) -> np.ndarray:
     table[kernel.DECAY] = hidden.get("tank_empties", {}).get("per_s", 0.0)
     ripple = hidden.get("compressor_ripple", {"ratio": 0.0, "frequency_hz": 0.0})
     table[kernel.RIPPLE], table[kernel.RIPPLE_HZ] = ripple["ratio"], ripple["frequency_hz"]
+    table[kernel.STRETCH] = hidden.get("chamber_stretch", {}).get("per_curv2", 0.0)
     table[kernel.WARMING] = hidden.get("warming_silicone", {}).get("per_s", 0.0)
     return table
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import yaml
 
-from virtual_lab import soft
+from virtual_lab import kernel, soft
 from virtual_lab.__main__ import main
 from virtual_lab.assemble import assemble
 from virtual_lab.bench import Instruments, step_rows
@@ -54,6 +54,34 @@ def test_energy_only_falls_without_pressure_and_friction():
     inner = slice(5, -5)
     assert np.ptp(total[inner]) < 2e-3 * total[0]
     assert lost[-1] > 0.3 * total[0]
+
+
+@pytest.mark.parametrize("bends", [False, True])
+def test_chambers_that_lengthen_move_the_links_as_their_places_say(bends):
+    """Velocities and accelerations of the chain are differences of the places that the camera sees."""
+    rng = np.random.default_rng(5)
+    p = Parameters(bending_stiffness_n_m2=0.005 if bends else None)
+    hidden = ({"name": "chamber_stretch", "per_curv2": 3e-4},)
+    tables = assemble(Truth(p, unlisted=hidden), Trial("still", 1.0, 0.0, kind="still"), 1.0)
+    free = np.column_stack([rng.normal(0, s, 4) for s in (10.0, 50.0, 0.0, 500.0)])
+    bent = np.column_stack([rng.normal(0, s, 4) for s in (10.0, 50.0, 0.0, 500.0)]) if bends else free
+    lengths, chain = np.empty((4, 3)), np.zeros((5, kernel.CHAIN_COLUMNS))
+    kernel.set_lengths(free, tables.lengths, 3e-4, lengths)
+    kernel.set_chain(bent, lengths, tables.ground, chain)
+
+    def places(t):
+        kappa, no_load = (v[:, 0] + v[:, 1] * t + v[:, 3] * t * t / 2 for v in (bent, free))
+        row = np.concatenate([np.zeros(6), kappa, 0 * kappa, *([no_load, 0 * no_load] if bends else [])])
+        seen = look(tables, row[None], np.zeros(1))
+        return np.stack([seen.x[0], seen.y[0], seen.theta[0]], axis=1)
+
+    h = 1e-4
+    before, now, after = places(-h), places(0.0), places(h)
+    np.testing.assert_allclose(chain[:, [kernel.RX, kernel.RY]], now[:, :2], atol=1e-12)
+    columns = [kernel.VX, kernel.VY, kernel.TURN]
+    np.testing.assert_allclose(chain[:, columns], (after - before) / (2 * h), rtol=1e-4, atol=1e-4)
+    columns = [kernel.AX, kernel.AY, kernel.TURN_RATE]
+    np.testing.assert_allclose(chain[:, columns], (after - 2 * now + before) / h**2, rtol=1e-3, atol=2e-2)
 
 
 def test_gap_springs_are_in_series_with_the_chambers():
