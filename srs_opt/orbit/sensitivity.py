@@ -119,7 +119,7 @@ def _moved_switch(run: Integrator, orbit: Orbit, p: np.ndarray, segment: int, at
     after = solution.valve[:, solution.mesh.phase[node]].copy()
     before = after.copy()
     before[segment] = -after[segment]
-    rates = _actuator_rates(run.structure)
+    rates = actuator_rates(run.structure)
     jump = [np.asarray(rates(state[run.layout.actuator], v, p)).ravel() for v in (before, after)]
     dx = np.zeros(run.states)
     dx[run.layout.actuator] = jump[0] - jump[1]
@@ -167,7 +167,8 @@ def _motion_slope(orbit: Orbit, path: np.ndarray, stretch: float) -> np.ndarray:
 
 
 @lru_cache(maxsize=32)
-def _actuator_rates(structure: Structure) -> ca.Function:
+def actuator_rates(structure: Structure) -> ca.Function:
+    """Return ``rates(act, valve, p)``: the time derivative of the actuators' states."""
     parameters, _, actuator = build(structure)
     act, valve = ca.SX.sym("act", actuator.states), ca.SX.sym("valve", structure.segments)
     rates = actuator.rates(actuator.unstack(act), valve).vector()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache, partial
@@ -231,3 +232,14 @@ def body_over_cycle(
     x, y = centre_lines(run, kappas.T).T
     room_x, room_y = rotate(poses[:, 2], x, y)
     return at, poses, room_x + poses[:, 0], room_y + poses[:, 1]
+
+
+def travelling(robot: Robot, gait: Gait, model: str | None = None) -> np.ndarray:
+    """Return the state (nx,) of a steady gait at its time 0, at the origin, travelling along x."""
+    orbit = steady_gait(robot, gait, model)
+    state = orbit.solution.start.copy()
+    dx, dy, turn = orbit.motion.displacement
+    course = math.atan2(dy, dx) - turn / 2 + (math.pi if orbit.speed_m_s < 0 else 0.0)
+    state[:3] = 0.0, 0.0, state[2] - course
+    state[WORK] = 0.0
+    return state

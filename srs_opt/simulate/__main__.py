@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import sys
+from typing import TYPE_CHECKING
 
 from srs_opt.command import (
     Answer,
@@ -15,6 +16,11 @@ from srs_opt.command import (
     positive_float,
     run_command,
 )
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from srs_opt.robot import Robot
 
 
 def build_parser() -> Parser:
@@ -41,6 +47,11 @@ def build_parser() -> Parser:
         help="delay between segments, rad (default 2 pi/(N-1))",
     )
     add("--gait", metavar="FILE", help="gait of gait_opt (JSON), TABLE.json:NAME, or a schedule CSV, instead")
+    add(
+        "--valves",
+        metavar="FILE",
+        help="play the valves.csv of a manoeuvre once, from rest or out of the steady --gait, instead",
+    )
     add("--duration", type=positive_float, default=20.0, metavar="S", help="simulated time, s (default 20)")
     add(
         "--heading",
@@ -59,16 +70,21 @@ def run(options: argparse.Namespace) -> Answer:
     from srs_opt.robot import load_robot
     from srs_opt.simulate.export import write_trajectory
     from srs_opt.simulate.figures import draw_simulation
-    from srs_opt.simulate.run import simulate
+    from srs_opt.simulate.run import simulate, simulate_valves
+    from srs_opt.simulate.valve_file import read_valves
 
     robot = load_robot(options.robot)
     model = chosen_model(options, robot)
-    if options.gait:
+    if options.valves:
+        timeline = read_valves(options.valves, robot.segments)
+        result = simulate_valves(robot, timeline, model, _in_gait(options, robot, model))
+    elif options.gait:
         gait = load_gait(options.gait, options.pressure)
+        result = simulate(robot, gait, options.duration, model, options.heading)
     else:
         lag = 2 * math.pi / robot.segments if options.phase_lag is None else options.phase_lag
         gait = Wave.uniform(robot.segments, options.frequency, options.pressure, lag, options.offset).gait()
-    result = simulate(robot, gait, options.duration, model, options.heading)
+        result = simulate(robot, gait, options.duration, model, options.heading)
     files = [write_trajectory(result.trajectory, options.out / "trajectory.csv")]
     files += draw_simulation(robot, model, result, options.out / "trajectory")
     record = {
@@ -80,6 +96,16 @@ def run(options: argparse.Namespace) -> Answer:
         "compile_s": result.compile_s,
     }
     return Answer(record, _words(record), files=tuple(files))
+
+
+def _in_gait(options: argparse.Namespace, robot: Robot, model: str) -> np.ndarray | None:
+    """Return the state in the steady gait of --gait, travelling along x; None without one."""
+    from srs_opt.gait_file import load_gait
+    from srs_opt.orbit.steady import travelling
+
+    if not options.gait:
+        return None
+    return travelling(robot, load_gait(options.gait, options.pressure), model)
 
 
 def _words(record: dict[str, float | None]) -> str:

@@ -41,7 +41,8 @@ def draw_simulation(robot: Robot, model: str, result: Simulation, stem: Path) ->
     room.set_xlabel("x (m)")
     room.set_ylabel("y (m)")
     room.set_title("centre of mass (line) and body")
-    last = path.time_s >= path.time_s[-1] - 3 * result.gait.period_s
+    shown_s = path.time_s[-1] if result.gait is None else 3 * result.gait.period_s
+    last = path.time_s >= path.time_s[-1] - shown_s
     for i in range(robot.segments):
         colour = COLOURS[i % len(COLOURS)]
         bend.plot(path.time_s[last], path.kappa[last, i], color=colour, label=f"segment {i + 1}")

@@ -27,7 +27,8 @@ class Simulation:
 
     Attributes
     ----------
-    gait : Gait
+    gait : Gait or None
+        None where valves were played once.
     trajectory : Trajectory
     speed_m_s, turn_rate_rad_s : float or None
         Means over the whole cycles of the second half; None when there are fewer than two cycles.
@@ -38,7 +39,7 @@ class Simulation:
     wall_s, compile_s : float
     """
 
-    gait: Gait
+    gait: Gait | None
     trajectory: Trajectory
     speed_m_s: float | None
     turn_rate_rad_s: float | None
@@ -84,6 +85,18 @@ def simulate(
     return Simulation(
         gait, trajectory, speed, turn_rate, radius, error, wall, compiled.compile_seconds - before
     )
+
+
+def simulate_valves(
+    robot: Robot, timeline: Timeline, model: str | None = None, start: np.ndarray | None = None
+) -> Simulation:
+    """Play valves once, from `start` (nx,) or from the straight robot at rest; no mean speeds."""
+    before = compiled.compile_seconds
+    run = Integrator(robot, model)
+    began = time.perf_counter()
+    trajectory = run.run(timeline, run.rest() if start is None else start)
+    wall = time.perf_counter() - began
+    return Simulation(None, trajectory, None, None, None, None, wall, compiled.compile_seconds - before)
 
 
 def _second_half(

@@ -22,6 +22,7 @@ LAYERS = (
     ("srs_opt.gait_opt", "srs_opt.gait_map"),
     ("srs_opt.gait_file", "srs_opt.controller"),
     ("srs_opt.judge",),
+    ("srs_opt.manoeuvre",),
     ("srs_opt.measurement",),
     ("srs_opt.drive",),
     ("srs_opt.calibrate",),

@@ -1,0 +1,194 @@
+"""The constraints of a manoeuvre as numbers that must not be negative, with their derivatives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from srs_opt.manoeuvre.shooting import Shot
+from srs_opt.manoeuvre.task import (
+    GAIT_CURVATURE_SHARE,
+    GAIT_SPEED_M_S,
+    POSE_M,
+    POSE_RAD,
+    REST_CURVATURE_1_M,
+    REST_SPEED_M_S,
+    Task,
+)
+from srs_opt.orbit.motion import rotate
+from srs_opt.simulate.integrate import Integrator
+from srs_opt.simulate.shapes import centre_lines
+
+LEVER_M = 0.1  # turns angles into lengths
+SECOND_M = 0.5  # turns speeds into lengths: large enough that a violation costs more than it gains
+BEND_M2 = 0.03  # turns curvatures into lengths, likewise
+LOOK_S = 0.01  # between instants at which the body is measured; it moves 5 mm meanwhile
+_HAIR = 1e-6
+Part = tuple[np.ndarray, np.ndarray]  # values and slopes
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Constraints in lengths (m): values (n,), to be at least 0, and slopes (n, m) (None where not asked).
+
+    The columns are those of `Shot.slopes` and one more: the radius of the disc that holds the body.
+    """
+
+    values: np.ndarray
+    slopes: np.ndarray | None
+
+
+class RowMaker:
+    """Makes the rows of one task; `inside` (0 to 1) tightens tolerances so that ticks do not break them."""
+
+    def __init__(self, run: Integrator, task: Task, inside: float = 0.8) -> None:
+        self.run, self.task, self.inside = run, task, inside
+
+    def __call__(self, shot: Shot, radius_m: float = 0.0) -> Rows:
+        """Return the rows of a simulated manoeuvre."""
+        parts = [*self._end(shot), *self._on_the_way(shot, self.looks(shot), radius_m)]
+        values = np.concatenate([np.atleast_1d(v) for v, _ in parts])
+        if shot.slopes is None:
+            return Rows(values, None)
+        return Rows(values, np.vstack([np.atleast_2d(s) for _, s in parts]))
+
+    def end_values(self, shot: Shot) -> np.ndarray:
+        """Return what the end asks for, without slopes, (n,)."""
+        return np.array([value for value, _ in self._end(replace(shot, slopes=None))])
+
+    def space_values(self, shot: Shot, looked: np.ndarray) -> np.ndarray:
+        """Return by how much the body keeps to its room at the nodes `looked`, (n,)."""
+        room = replace(self.task, objective="time", bounds=replace(self.task.bounds, max_curvature_1_m=None))
+        maker = RowMaker(self.run, room, self.inside)
+        parts = maker._on_the_way(replace(shot, slopes=None), looked, 0.0)
+        return np.concatenate([np.zeros(0), *(values for values, _ in parts)])
+
+    def _linear(self, shot: Shot, node: int, weights: np.ndarray, offset: float) -> Part:
+        value = np.asarray(weights @ shot.states[node] + offset)
+        if shot.slopes is None:
+            return value, np.zeros(0)
+        return value, np.append(weights @ shot.slopes[node], 0.0)
+
+    def _band(self, shot: Shot, index: int, wanted: float, tolerance: float, unit: float) -> list[Part]:
+        """Return two rows: a final state lies within a tolerance of what is wanted."""
+        weights = np.zeros(self.run.states)
+        weights[index] = unit
+        room = self.inside * tolerance * unit
+        return [
+            self._linear(shot, -1, weights, room - wanted * unit),
+            self._linear(shot, -1, -weights, room + wanted * unit),
+        ]
+
+    def _end(self, shot: Shot) -> list[Part]:
+        end, layout, rows = self.task.end, self.run.layout, list[Part]()
+        if end.past_m is not None:
+            weights = np.zeros(self.run.states)
+            weights[0] = np.sign(end.past_m)
+            rows.append(self._linear(shot, -1, weights, -abs(end.past_m)))
+        if end.turn_rad is not None:
+            weights = np.zeros(self.run.states)
+            weights[2] = np.sign(end.turn_rad) * LEVER_M
+            begun = float(weights @ self.task.start.state)
+            rows.append(self._linear(shot, -1, weights, -abs(end.turn_rad) * LEVER_M - begun))
+        if end.pose is not None:
+            for index, tolerance, unit in ((0, POSE_M, 1.0), (1, POSE_M, 1.0), (2, POSE_RAD, LEVER_M)):
+                rows += self._band(shot, index, end.pose[index], tolerance, unit)
+        if end.rest:
+            for index in (3, 4):
+                rows += self._band(shot, index, 0.0, REST_SPEED_M_S / 2, SECOND_M)
+            for index in range(layout.kappa.start, layout.kappa.stop):
+                rows += self._band(shot, index, 0.0, REST_CURVATURE_1_M, BEND_M2)
+        if end.orbit is not None:
+            wanted = end.orbit.solution.start
+            for index in (3, 4):
+                rows += self._band(shot, index, wanted[index], GAIT_SPEED_M_S, SECOND_M)
+            largest = float(np.abs(end.orbit.kappa).max())
+            for index in range(layout.kappa.start, layout.kappa.stop):
+                rows += self._band(shot, index, wanted[index], GAIT_CURVATURE_SHARE * largest, BEND_M2)
+        return rows
+
+    def _on_the_way(self, shot: Shot, looked: np.ndarray, radius_m: float) -> list[Part]:
+        task, rows = self.task, list[Part]()
+        if task.end.within_m is not None:
+            rows.append(self._near_start(shot, looked, task.end.within_m))
+        if task.space is not None or task.objective == "space":
+            points, slopes = self.points(shot, looked)
+            half = self.run.robot.body_width_m / 2
+            flat = points.reshape(-1, 2)
+            if task.space is not None:
+                depth, toward = task.space.depth(flat)
+                rows.append((depth - half, self._chain(toward, slopes)))
+            if task.objective == "space":
+                centre = self.centre(points)
+                away = flat - centre
+                distance = np.hypot(*away.T)
+                slope = self._chain(-away / np.maximum(distance, 1e-9)[:, None], slopes)
+                if slope.size:
+                    slope[:, -1] = 1.0
+                rows.append((radius_m - distance - half, slope))
+        most = task.bounds.max_curvature_1_m
+        if most is not None:
+            for index in range(self.run.layout.kappa.start, self.run.layout.kappa.stop):
+                for sign in (1.0, -1.0):
+                    values = BEND_M2 * (most - sign * shot.states[looked, index])
+                    slope = np.zeros((looked.size, 0))
+                    if shot.slopes is not None:
+                        slope = -sign * BEND_M2 * shot.slopes[looked, index]
+                        slope = np.column_stack([slope, np.zeros(looked.size)])
+                    rows.append((values, slope))
+        return rows
+
+    def _near_start(self, shot: Shot, looked: np.ndarray, radius: float) -> Part:
+        away = shot.states[looked, :2] - self.task.start.state[:2]
+        distance = np.hypot(*away.T)
+        slope = np.zeros((looked.size, 0))
+        if shot.slopes is not None:
+            toward = -away / np.maximum(distance, 1e-9)[:, None]
+            slope = np.einsum("nk,nkm->nm", toward, shot.slopes[looked, :2])
+            slope = np.column_stack([slope, np.zeros(looked.size)])
+        return radius - distance, slope
+
+    @staticmethod
+    def _chain(toward: np.ndarray, slopes: np.ndarray | None) -> np.ndarray:
+        if slopes is None:
+            return np.zeros((len(toward), 0))
+        flat = slopes.reshape(-1, 2, slopes.shape[-1])
+        return np.column_stack([np.einsum("nk,nkm->nm", toward, flat), np.zeros(len(flat))])
+
+    @staticmethod
+    def centre(points: np.ndarray) -> np.ndarray:
+        """Return the centre of the smallest circle about the body's points, to a millimetre."""
+        import shapely
+
+        circle = shapely.minimum_bounding_circle(shapely.MultiPoint(points.reshape(-1, 2)))
+        return np.asarray(circle.centroid.coords[0])
+
+    @staticmethod
+    def looks(shot: Shot) -> np.ndarray:
+        """Return the nodes at which the body is measured."""
+        count = max(int(np.ceil(shot.time_s[-1] / LOOK_S)), 2)
+        wanted = np.linspace(0.0, shot.time_s[-1], count + 1)
+        return np.unique(np.searchsorted(shot.time_s, wanted - 1e-9).clip(max=shot.time_s.size - 1))
+
+    def points(self, shot: Shot, looked: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
+        """Return the centre lines (n, points, 2) in the room and their slopes (n, points, 2, m)."""
+        states = shot.states[looked]
+        kappa, (x, y, heading) = states[:, self.run.layout.kappa], states[:, :3].T
+        line = centre_lines(self.run, kappa)
+        bx, by = rotate(heading[:, None], line[..., 0], line[..., 1])
+        points = np.stack([x[:, None] + bx, y[:, None] + by], axis=-1)
+        if shot.slopes is None:
+            return points, None
+        moved = shot.slopes[looked]
+        slopes = np.repeat(moved[:, None, :2], line.shape[1], axis=1)
+        turned = np.stack([-by, bx], axis=-1)
+        slopes = slopes + turned[..., None] * moved[:, None, None, 2]
+        for k in range(kappa.shape[1]):
+            hair = np.zeros(kappa.shape[1])
+            hair[k] = _HAIR
+            bent = (centre_lines(self.run, kappa + hair) - centre_lines(self.run, kappa - hair)) / (2 * _HAIR)
+            gx, gy = rotate(heading[:, None], bent[..., 0], bent[..., 1])
+            by_kappa = moved[:, self.run.layout.kappa.start + k]
+            slopes += np.stack([gx, gy], axis=-1)[..., None] * by_kappa[:, None, None]
+        return points, slopes

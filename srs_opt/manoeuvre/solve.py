@@ -1,0 +1,242 @@
+"""All switch times at once: sequential linear programming with exact slopes in a trust region.
+
+The motion depends on its switch times smoothly but, near sticking friction, with strong curvature; its
+memory is short (velocities and bends decay within a cycle) and only the pose adds up. So one shoot from the
+start is well conditioned, the linear model is right within some milliseconds, and optima lie in corners:
+where dwell, end and room bind. Violations are penalized exactly (L1).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import sparse
+from scipy.optimize import linprog
+
+from srs_opt.errors import NoAnswerError
+from srs_opt.manoeuvre.rows import RowMaker, Rows
+from srs_opt.manoeuvre.shooting import STEP_S, Shot, shoot, shoot_with_slopes
+from srs_opt.manoeuvre.task import Task
+from srs_opt.manoeuvre.valves import ValvePlan
+from srs_opt.simulate.integrate import Integrator
+
+PENALTY_PER_M = 20.0  # seconds per metre of violation; a manoeuvre's own price is about 2
+FRACTIONS = (1.0, 0.5, 0.2, 0.05)  # of a step, simulated side by side
+REACH_S, LEAST_REACH_S, MOST_REACH_S = 0.02, 3e-4, 0.08
+PRESSURE_PER_S = 50.0  # kPa that a step may change per second of reach
+SPACE_S_PER_M = 20.0  # price of the disc's radius where it is the objective
+TIME_BESIDE = 0.02  # weight of time where it is not
+SATISFIED_M = 2e-4
+_GAIN_S = 2e-4
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A manoeuvre with what it costs: `merit` = price + penalty; `worst_m` the largest violation."""
+
+    plan: ValvePlan
+    price: float
+    merit: float
+    worst_m: float
+    steps: int = 0
+
+
+class Solver:
+    """Optimizes manoeuvres of one task on one model (which holds the friction's smoothing)."""
+
+    def __init__(self, run: Integrator, task: Task, step_s: float = STEP_S) -> None:
+        self.run, self.task, self.step_s = run, task, step_s
+        self.rows = RowMaker(run, task)
+        self.ages = task.start.ages_s(run.structure.segments)
+
+    def judge(self, plans: list[ValvePlan]) -> list[Candidate]:
+        """Simulate and judge manoeuvres."""
+        return [self._judged(shot) for shot in shoot(self.run, self.task.start.state, plans, self.step_s)]
+
+    def _judged(self, shot: Shot) -> Candidate:
+        radius = self._radius(shot)
+        values = self.rows(shot, radius).values
+        if not np.isfinite(values).all():
+            return Candidate(shot.plan, np.inf, np.inf, np.inf)
+        missed = np.minimum(values, 0.0)
+        # many rows tell of one overlap: the worst counts, and a little of the others
+        price = self._price(shot.plan, radius)
+        merit = price - PENALTY_PER_M * (missed.sum() if values.size < 60 else missed.min() * 3)
+        return Candidate(shot.plan, price, float(merit), float(-missed.min(initial=0.0)))
+
+    def _radius(self, shot: Shot) -> float:
+        if self.task.objective != "space":
+            return 0.0
+        points, _ = self.rows.points(Shot(shot.plan, shot.time_s, shot.states), self.rows.looks(shot))
+        away = points.reshape(-1, 2) - self.rows.centre(points)
+        return float(np.hypot(*away.T).max()) + self.run.robot.body_width_m / 2
+
+    def _price(self, plan: ValvePlan, radius_m: float) -> float:
+        if self.task.objective == "space":
+            return SPACE_S_PER_M * radius_m + TIME_BESIDE * plan.duration_s
+        if self.task.objective == "air":
+            return 0.02 * plan.fills * plan.pressure_kpa / 50.0 + TIME_BESIDE * plan.duration_s
+        return plan.duration_s
+
+    def plays(self, plan: ValvePlan) -> bool:
+        """Whether valves can play a plan from the start: every switch inside it and dwelt for."""
+        _, room = self._dwell_rows(plan, plan.switches + 2)
+        return bool((room > -1e-9).all())
+
+    def solve(self, plan: ValvePlan, most: int = 60) -> Candidate:
+        """Return the local optimum near a manoeuvre."""
+        (best,) = self.judge([plan])
+        reach, idle = REACH_S, 0
+        steps = 0
+        while steps < most and reach >= LEAST_REACH_S and idle < 4:
+            steps += 1
+            shot = shoot_with_slopes(self.run, self.task.start.state, best.plan, self.step_s)
+            step = self._step(shot, reach)
+            if step is None:
+                break
+            old = np.concatenate([best.plan.times(), [best.plan.duration_s, best.plan.pressure_kpa]])
+            trials = [best.plan.with_times(*_split(old + f * step)) for f in FRACTIONS]
+            found = self.judge([t.trimmed() for t in trials])
+            k = int(np.argmin([c.merit for c in found]))
+            gain = best.merit - found[k].merit
+            if gain > 0:
+                best = found[k]
+                idle = idle + 1 if gain < _GAIN_S else 0
+                reach = (
+                    min(2 * reach, MOST_REACH_S) if k == 0 else max(FRACTIONS[k] * 1.5 * reach, LEAST_REACH_S)
+                )
+            else:
+                reach *= FRACTIONS[-1] * 4
+            merged = self._without_short_pulses(best)
+            if merged is not None:
+                best = merged
+        return Candidate(best.plan, best.price, best.merit, best.worst_m, steps)
+
+    def _without_short_pulses(self, best: Candidate) -> Candidate | None:
+        """Return the manoeuvre without a pulse that has shrunk to the dwell, if it is the better for it."""
+        trials = []
+        for s, row in enumerate(best.plan.rows):
+            for k in range(len(row.times_s) - 1):
+                short = row.times_s[k + 1] - row.times_s[k] < self.task.bounds.dwell_s + 1e-4
+                if short and row.states[k] == row.states[k + 2]:
+                    rows = [*best.plan.rows]
+                    rows[s] = row.without_pulse(k)
+                    trials.append(replace(best.plan, rows=tuple(rows)))
+        if not trials:
+            return None
+        found = min(self.judge(trials), key=lambda c: c.merit)
+        return found if found.merit < best.merit + _GAIN_S else None
+
+    def _step(self, shot: Shot, reach: float) -> np.ndarray | None:
+        """Return the linear model's best change of times, duration and pressure; None if there is none."""
+        plan, task, bounds = shot.plan, self.task, self.task.bounds
+        radius = self._radius(shot)
+        rows = self.rows(shot, radius)
+        keep = rows.values < 1.5 * max(reach, 0.01) + 0.05
+        rows = Rows(rows.values[keep], None if rows.slopes is None else rows.slopes[keep])
+        assert rows.slopes is not None
+        n, m = plan.switches, rows.values.size
+        size = n + 2 + 1 + m  # times, duration, pressure; radius; violations
+        cost = np.zeros(size)
+        cost[n] = 1.0 if task.objective == "time" else TIME_BESIDE
+        cost[n + 1] = 0.02 * plan.fills / 50.0 if task.objective == "air" else 0.0
+        cost[n + 2] = SPACE_S_PER_M if task.objective == "space" else 0.0
+        cost[n + 3 :] = PENALTY_PER_M
+        near = sparse.hstack([sparse.csr_matrix(-rows.slopes), -sparse.identity(m)])
+        dwell, room = self._dwell_rows(plan, size)
+        low, high = np.full(size, -np.inf), np.full(size, np.inf)
+        low[:n], high[:n] = -reach, reach
+        low[n], high[n] = -4 * reach, 4 * reach
+        if task.longest_s is not None:
+            high[n] = min(high[n], max(task.longest_s - plan.duration_s, low[n]))
+        low[n] = max(low[n], 0.05 - plan.duration_s)
+        span = PRESSURE_PER_S * reach
+        low[n + 1] = np.clip(bounds.pressure_kpa[0] - plan.pressure_kpa, -span, span)
+        high[n + 1] = np.clip(bounds.pressure_kpa[1] - plan.pressure_kpa, -span, span)
+        if not task.pressure_is_free:
+            low[n + 1] = high[n + 1] = 0.0
+        low[n + 2], high[n + 2] = -5 * reach, 5 * reach
+        low[n + 3 :] = 0.0
+        found = linprog(
+            cost,
+            A_ub=sparse.vstack([near, dwell]).tocsr(),
+            b_ub=np.concatenate([rows.values, room]),
+            bounds=np.column_stack([low, high]),
+            method="highs",
+        )
+        return None if found.x is None else np.asarray(found.x[: n + 2])
+
+    def _dwell_rows(self, plan: ValvePlan, size: int) -> tuple[sparse.csr_matrix, np.ndarray]:
+        """Return ``A x <= b``: switches of a segment keep the dwell, at start and end too."""
+        least = self.task.bounds.dwell_s
+        n = plan.switches
+        entries: list[tuple[int, int, float]] = []
+        room: list[float] = []
+
+        def row(later: int | None, earlier: int | None, gap: float) -> None:
+            if later is not None:
+                entries.append((len(room), later, -1.0))
+            if earlier is not None:
+                entries.append((len(room), earlier, 1.0))
+            room.append(gap)
+
+        first = 0
+        tail = self._tail_s()
+        for segment, (valves, age) in enumerate(zip(plan.rows, self.ages)):
+            times = valves.times_s
+            for k, time in enumerate(times):
+                if k == 0:
+                    # at rest a valve may be vented until its first switch: no dwell before that
+                    wait = 0.0 if valves.states[0] == 0 else least
+                    since = 0.0 if age == np.inf else -age
+                    row(first, None, time - since - wait)
+                else:
+                    row(first + k, first + k - 1, time - times[k - 1] - least)
+            if times:
+                row(n, first + len(times) - 1, plan.duration_s - times[-1] - tail[segment])
+            first += len(times)
+        if not room:
+            return sparse.csr_matrix((0, size)), np.zeros(0)
+        at_row, at_column, value = zip(*entries)
+        matrix = sparse.csr_matrix((value, (at_row, at_column)), shape=(len(room), size))
+        return matrix, np.array(room)
+
+    def _tail_s(self) -> list[float]:
+        """Return how long each segment's last state must have stood at the end."""
+        orbit = self.task.end.orbit
+        if orbit is None:
+            return [0.0] * self.run.structure.segments
+        gait = orbit.gait
+        first = [min(t for pair in pairs for t in pair) for pairs in gait.intervals]
+        return [max(self.task.bounds.dwell_s - t, 0.0) for t in first]
+
+
+def _split(x: np.ndarray) -> tuple[np.ndarray, float, float]:
+    return x[:-2], float(x[-2]), float(x[-1])
+
+
+def smoothed(robot_run: Integrator, friction_speed_m_s: float) -> Integrator:
+    """Return the model with its friction smoothed at least so much."""
+    robot = robot_run.robot
+    if friction_speed_m_s <= robot.friction_speed_m_s:
+        return robot_run
+    return Integrator(
+        robot.with_values(friction_speed_m_s=friction_speed_m_s), robot_run.structure.model, room=False
+    )
+
+
+def climb(
+    run: Integrator, task: Task, plan: ValvePlan, ladder: tuple[float, ...], most: int = 60
+) -> Candidate:
+    """Return the optimum that a ladder of friction smoothing speeds leads to, the robot's own last."""
+    best: Candidate | None = None
+    for speed in (*ladder, 0.0):
+        rung = Solver(smoothed(run, speed), task)
+        found = rung.solve(plan, most)
+        plan = found.plan
+        if speed == 0.0:
+            best = found
+    if best is None:
+        raise NoAnswerError("no rung")
+    return best

@@ -1,0 +1,173 @@
+"""Where the optimization begins: many simulated waves and table gaits, the most promising of them kept.
+
+A wave here is one of the paper's (13) with its own frequency, pressure, lag, offset and phase at time 0. None
+is steady: what counts is how each does from the manoeuvre's own start to its end.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from srs_opt.gait import Gait, Wave
+from srs_opt.manoeuvre.shooting import shoot
+from srs_opt.manoeuvre.solve import Candidate, Solver
+from srs_opt.manoeuvre.task import Task
+from srs_opt.manoeuvre.valves import COINCIDENT_S, ValvePlan, ValveRow, gait_end
+
+PLANS = 960  # simulated at most, several lengths of time per wave where the end is not merely passed
+WAVES = 240
+FREQUENCY_HZ, LAG_RAD = (1.2, 4.5), (0.6, 1.6)
+TIMES = 6  # lengths tried per wave
+FIRST_S = 0.25
+SETTLE_S, STAIRS = 0.1, 8  # for a change of pressure, as the planner has it
+ALIKE = 0.004  # merits of starts that are taken for the same
+
+
+def starts(
+    solver: Solver, gaits: Sequence[Gait], count: int, seed: int, waves: int = WAVES
+) -> list[Candidate]:
+    """Return the best `count` starts among waves (mirrored and backwards too) and the given gaits."""
+    task, segments = solver.task, solver.run.structure.segments
+    rng = np.random.default_rng(seed)
+    low, high = task.bounds.pressure_kpa
+    given = task.pressure_kpa
+    drawn: list[Gait] = [g if given is None else replace(g, pressure_kpa=given) for g in gaits]
+    drawn = [g for g in drawn if given is not None or low <= g.pressure_kpa <= high]
+    if not passed(task):
+        waves = min(waves, PLANS // TIMES // 2)
+        drawn = [drawn[k] for k in rng.permutation(len(drawn))[:waves]]
+    turning = task.end.turn_rad is not None or task.end.pose is not None
+    backwards = task.end.past_m is not None and task.end.past_m < 0
+    for _ in range(waves):
+        frequency, lag, phase = rng.uniform(*FREQUENCY_HZ), rng.uniform(*LAG_RAD), rng.uniform(0, 2 * math.pi)
+        pressure = task.pressure_kpa or high - (high - low) * 0.4 * rng.uniform() ** 2
+        offset = (
+            0.0 if not turning else rng.uniform(0.0, 0.95) * np.sign(task.end.turn_rad or rng.uniform(-1, 1))
+        )
+        wave = Wave(
+            frequency,
+            pressure,
+            tuple(phase + (-lag if backwards else lag) * i for i in range(1, segments + 1)),
+            (float(offset),) * segments,
+        )
+        drawn.append(wave.gait())
+    plans = _until_arrival(solver, drawn) or [plan for gait in drawn for plan in lengths(task, gait)]
+    judged = sorted(solver.judge(plans), key=lambda c: c.merit)
+    kept: list[Candidate] = []
+    for candidate in judged:
+        if len(kept) == count:
+            break
+        if all(abs(candidate.merit - k.merit) > ALIKE * abs(k.merit) for k in kept):
+            kept.append(candidate)
+    return kept
+
+
+def passed(task: Task) -> bool:
+    """Whether the end is a line or a heading that only has to be passed."""
+    end = task.end
+    return not end.rest and end.orbit is None and end.pose is None
+
+
+def _until_arrival(solver: Solver, gaits: Sequence[Gait]) -> list[ValvePlan]:
+    """Return the gaits that arrive, played until they do, where the end is a line or a heading."""
+    task, end = solver.task, solver.task.end
+    if not passed(task):
+        return []
+    plans = []
+    longest = [playable(task, lengths(task, g)[-1]) for g in gaits]
+    for shot in shoot(solver.run, task.start.state, longest, solver.step_s):
+        pose = shot.states[:, :3] - task.start.state[:3]
+        done = np.ones(shot.time_s.size, dtype=bool)
+        for wanted, have in ((end.past_m, shot.states[:, 0]), (end.turn_rad, pose[:, 2])):
+            if wanted is not None:
+                done &= np.sign(wanted) * have >= abs(wanted)
+        if done.any():
+            until = max(float(shot.time_s[done.argmax()]), FIRST_S)
+            plans.append(replace(shot.plan, duration_s=until).trimmed())
+    return plans
+
+
+def lengths(task: Task, gait: Gait) -> list[ValvePlan]:
+    """Return the gait played for several lengths of time, with what the task's start and end ask for."""
+    longest = task.longest_s or _likely_s(task)
+    tail = task.end.orbit.gait if task.end.orbit is not None else None
+    plans = []
+    for played in np.geomspace(max(longest / 6, FIRST_S), longest, TIMES):
+        plan = ValvePlan.of_gaits((gait,), float(played))
+        if task.end.rest:
+            plan = vented(plan, 0.45)
+        if tail is not None:
+            plan = followed(plan, tail, 2)
+        plans.append(playable(task, plan))
+    return plans
+
+
+def _likely_s(task: Task) -> float:
+    """Return a time within which the task is done with some ease."""
+    end = task.end
+    way = abs(end.past_m or 0.0) + (math.hypot(*end.pose[:2]) if end.pose else 0.0)
+    turn = abs(end.turn_rad or 0.0) + (abs(end.pose[2]) if end.pose else 0.0)
+    return 1.0 + 3.0 * way + 1.5 * turn
+
+
+def vented(plan: ValvePlan, for_s: float) -> ValvePlan:
+    """Return the plan with all valves vented at its end, for so long more."""
+    rows = tuple(ValveRow((*r.states, 0), (*r.times_s, plan.duration_s)) for r in plan.rows)
+    return replace(plan, rows=rows, duration_s=plan.duration_s + for_s)
+
+
+def followed(plan: ValvePlan, gait: Gait, cycles: int) -> ValvePlan:
+    """Return the plan and whole cycles of a gait after it, at the gait's pressure."""
+    later = ValvePlan.of_gaits((gait,), cycles * gait.period_s)
+    rows = []
+    for row, more in zip(plan.rows, later.rows):
+        times = tuple(t + plan.duration_s for t in more.times_s)
+        if row.states[-1] == more.states[0]:
+            rows.append(ValveRow(row.states + more.states[1:], row.times_s + times))
+        else:
+            rows.append(ValveRow(row.states + more.states, (*row.times_s, plan.duration_s, *times)))
+    return ValvePlan(tuple(rows), plan.duration_s + later.duration_s, gait.pressure_kpa)
+
+
+def playable(task: Task, plan: ValvePlan) -> ValvePlan:
+    """Return the plan begun from the start's valves, every switch late enough for the dwell."""
+    dwell = task.bounds.dwell_s
+    begun = None if task.start.gait is None else gait_end(task.start.gait)
+    rows = []
+    for segment, row in enumerate(plan.rows):
+        states, times = list(row.states), list(row.times_s)
+        earliest = 0.0
+        if begun is not None:
+            state, age = begun[0][segment], begun[1][segment]
+            if states[0] != state:
+                states, times = [state, *states], [0.0, *times]
+            earliest = max(dwell - age, 0.0)
+        elif times:
+            earliest = dwell
+        kept_states, kept_times = [states[0]], []
+        for state, time in zip(states[1:], times):
+            at = max(time, earliest)
+            if state == kept_states[-1]:
+                continue
+            if at > time + dwell:  # so late that the pulse is left out
+                kept_states[-1:] = [state] if len(kept_states) > 1 else kept_states[-1:]
+                continue
+            kept_states.append(state)
+            kept_times.append(at)
+            earliest = at + dwell
+        rows.append(ValveRow(tuple(kept_states), tuple(kept_times)))
+    end = max([plan.duration_s, *(r.times_s[-1] + COINCIDENT_S for r in rows if r.times_s)])
+    return replace(plan, rows=tuple(rows), duration_s=end, early=ramp(task, plan.pressure_kpa))
+
+
+def ramp(task: Task, to_kpa: float) -> tuple[tuple[float, float], ...]:
+    """Return the regulator's way from the pressure of the gait before, in stairs."""
+    if task.start.gait is None or task.start.gait.pressure_kpa == to_kpa:
+        return ()
+    middles = (np.arange(STAIRS) + 0.5) / STAIRS
+    kpa = task.start.gait.pressure_kpa + middles * (to_kpa - task.start.gait.pressure_kpa)
+    return tuple((SETTLE_S * (k + 1) / STAIRS, float(value)) for k, value in enumerate(kpa))
