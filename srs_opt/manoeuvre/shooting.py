@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import pairwise
 
 import casadi as ca
 import numpy as np
@@ -82,10 +83,9 @@ def shoot_with_slopes(run: Integrator, start: np.ndarray, plan: ValvePlan, step_
     """Simulate a manoeuvre and differentiate it."""
     nx = run.states
     course = _course(run, start, plan, step_s)
-    padded = Course(np.concatenate([start, np.zeros(nx * (nx + 1))]), course.h_s, course.valve, course.p)
-    found, _ = jacobian_kernel(run.structure).run([padded])
-    states = np.vstack([start, found[:, :nx, 0]])
-    jacobians = found[:, nx:, 0].reshape(-1, nx + 1, nx).transpose(0, 2, 1)
+    found, _ = run.kernel.run([course])
+    states = np.vstack([start, found[:, :, 0]])
+    jacobians = _jacobians(run, course, states)
     time = np.concatenate([[0.0], np.cumsum(course.h_s)])
     times = plan.times()
     m = times.size + 2
@@ -110,6 +110,19 @@ def shoot_with_slopes(run: Integrator, start: np.ndarray, plan: ValvePlan, step_
     # f at the end, from the last step itself: a finite difference would see the step's curvature
     slopes[-1, :, -2] = (states[-1] - states[-2]) / course.h_s[-1]
     return Shot(plan, time, states, slopes)
+
+
+def _jacobians(run: Integrator, course: Course, states: np.ndarray) -> np.ndarray:
+    """Return every step's Jacobian by state and pressure (n, nx, nx + 1), LANES parts of the way at once."""
+    nx, n = run.states, course.h_s.size
+    cuts = np.unique(np.linspace(0, n, LANES + 1).astype(int))
+    parts = [
+        Course(np.append(states[a], np.zeros(nx * (nx + 1))), course.h_s[a:b], course.valve[a:b], course.p)
+        for a, b in pairwise(cuts)
+    ]
+    found, _ = jacobian_kernel(run.structure).run(parts)
+    columns = [found[: part.h_s.size, nx:, lane] for lane, part in enumerate(parts)]
+    return np.concatenate(columns).reshape(n, nx + 1, nx).transpose(0, 2, 1)
 
 
 def _course(run: Integrator, start: np.ndarray, plan: ValvePlan, step_s: float) -> Course:

@@ -19,7 +19,7 @@ from srs_opt.manoeuvre.task import Task
 from srs_opt.manoeuvre.valves import COINCIDENT_S, ValvePlan, ValveRow, gait_end
 
 PLANS = 960  # simulated at most, several lengths of time per wave where the end is not merely passed
-WAVES = 240
+WAVES = 30  # per start that is wanted
 FREQUENCY_HZ, LAG_RAD = (1.2, 4.5), (0.6, 1.6)
 TIMES = 6  # lengths tried per wave
 FIRST_S = 0.25
@@ -27,11 +27,10 @@ SETTLE_S, STAIRS = 0.1, 8  # for a change of pressure, as the planner has it
 ALIKE = 0.004  # merits of starts that are taken for the same
 
 
-def starts(
-    solver: Solver, gaits: Sequence[Gait], count: int, seed: int, waves: int = WAVES
-) -> list[Candidate]:
+def starts(solver: Solver, gaits: Sequence[Gait], count: int, seed: int) -> list[Candidate]:
     """Return the best `count` starts among waves (mirrored and backwards too) and the given gaits."""
     task, segments = solver.task, solver.run.structure.segments
+    waves = WAVES * count
     rng = np.random.default_rng(seed)
     low, high = task.bounds.pressure_kpa
     given = task.pressure_kpa
