@@ -23,6 +23,7 @@ from srs_opt.simulate.shapes import centre_lines
 LEVER_M = 0.1  # turns angles into lengths
 SECOND_M = 0.5  # turns speeds into lengths: large enough that a violation costs more than it gains
 BEND_M2 = 0.03  # turns curvatures into lengths, likewise
+SPARE_M = 1e-4  # beyond a line, heading or wall, for the integration's error and ticks: 0.2 ms of way
 LOOK_S = 0.01  # between instants at which the body is measured; it moves 5 mm meanwhile
 _HAIR = 1e-6
 Part = tuple[np.ndarray, np.ndarray]  # values and slopes
@@ -44,6 +45,7 @@ class RowMaker:
 
     def __init__(self, run: Integrator, task: Task, inside: float = 0.8) -> None:
         self.run, self.task, self.inside = run, task, inside
+        self.spare_m = SPARE_M if inside < 1 else 0.0
 
     def __call__(self, shot: Shot, radius_m: float = 0.0) -> Rows:
         """Return the rows of a simulated manoeuvre."""
@@ -85,12 +87,12 @@ class RowMaker:
         if end.past_m is not None:
             weights = np.zeros(self.run.states)
             weights[0] = np.sign(end.past_m)
-            rows.append(self._linear(shot, -1, weights, -abs(end.past_m)))
+            rows.append(self._linear(shot, -1, weights, -abs(end.past_m) - self.spare_m))
         if end.turn_rad is not None:
             weights = np.zeros(self.run.states)
             weights[2] = np.sign(end.turn_rad) * LEVER_M
             begun = float(weights @ self.task.start.state)
-            rows.append(self._linear(shot, -1, weights, -abs(end.turn_rad) * LEVER_M - begun))
+            rows.append(self._linear(shot, -1, weights, -abs(end.turn_rad) * LEVER_M - begun - self.spare_m))
         if end.pose is not None:
             for index, tolerance, unit in ((0, POSE_M, 1.0), (1, POSE_M, 1.0), (2, POSE_RAD, LEVER_M)):
                 rows += self._band(shot, index, end.pose[index], tolerance, unit)
@@ -118,7 +120,7 @@ class RowMaker:
             flat = points.reshape(-1, 2)
             if task.space is not None:
                 depth, toward = task.space.depth(flat)
-                rows.append((depth - half, self._chain(toward, slopes)))
+                rows.append((depth - half - self.spare_m, self._chain(toward, slopes)))
             if task.objective == "space":
                 centre = self.centre(points)
                 away = flat - centre
@@ -147,7 +149,7 @@ class RowMaker:
             toward = -away / np.maximum(distance, 1e-9)[:, None]
             slope = np.einsum("nk,nkm->nm", toward, shot.slopes[looked, :2])
             slope = np.column_stack([slope, np.zeros(looked.size)])
-        return radius - distance, slope
+        return radius - distance - self.spare_m, slope
 
     @staticmethod
     def _chain(toward: np.ndarray, slopes: np.ndarray | None) -> np.ndarray:
