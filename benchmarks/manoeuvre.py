@@ -130,7 +130,7 @@ def section(rows: list[Row], when: str) -> Section:
             "passed" if row["passed"] else "failed",
             "-" if row["rival_s"] is None else f"{row['rival_s']:.3f}",
             "-" if row["rival_s"] is None else f"{100 * (1 - row['duration_s'] / row['rival_s']):.1f} %",
-            f"{row['cpu_s']:.0f}",
+            "-" if row["cpu_s"] is None else f"{row['cpu_s']:.0f}",
         ]
         for row in rows
     ]
