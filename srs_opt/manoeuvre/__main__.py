@@ -90,6 +90,7 @@ def build_parser() -> Parser:
 def run(options: argparse.Namespace) -> Answer:
     """Search, certify, write."""
     from srs_opt.controller.c_source import write_program
+    from srs_opt.errors import InputError
     from srs_opt.files import write_json
     from srs_opt.manoeuvre.export import draw_manoeuvre, program_of, record_of
     from srs_opt.manoeuvre.search import find
@@ -100,6 +101,10 @@ def run(options: argparse.Namespace) -> Answer:
 
     robot = load_robot(options.robot)
     model = chosen_model(options, robot)
+    if model == "compliant":
+        raise InputError(
+            "manoeuvres are not optimized on the compliant model: give --model complex or simplified"
+        )
     run = integrator(robot.with_values(valve_delay_s=0.0), model)
     task = _task(options, run, robot, model)
     gaits = [entry.gait for entry in _table(options, robot, model).gaits]
@@ -142,6 +147,9 @@ def _task(options: argparse.Namespace, run: Integrator, robot: Robot, model: str
     start = Start.at_rest(run)
     if options.begin:
         start = Start.in_gait(run, robot, _on_ticks(options, _gait(options, options.begin, robot, model)))
+    if after is not None and start.gait is not None and not run.actuator.linear:
+        if start.gait.pressure_kpa != after.gait.pressure_kpa:
+            raise InputError("effects make the actuators nonlinear: both gaits must have the same pressure")
     return Task(start, end, options.objective, space, bounds, options.longest)
 
 

@@ -109,6 +109,7 @@ CASES = [
     ("srs_opt.simulate", ["--valves", "{tmp}/absent.csv"], 2, "absent.csv"),
     ("srs_opt.simulate", ["--valves", "{tmp}/empty.csv"], 2, "empty.csv"),
     ("srs_opt.manoeuvre", [], 2, "--past, --turn"),
+    ("srs_opt.manoeuvre", ["--past", "1", "--model", "compliant"], 2, "not optimized on the compliant"),
     ("srs_opt.manoeuvre", ["--past", "0"], 2, "must not be 0"),
     ("srs_opt.manoeuvre", ["--rest", "--to", "fast"], 2, "not both"),
     ("srs_opt.manoeuvre", ["--to", "fastest"], 2, "fastest"),
