@@ -147,9 +147,9 @@ def _task(options: argparse.Namespace, run: Integrator, robot: Robot, model: str
     start = Start.at_rest(run)
     if options.begin:
         start = Start.in_gait(run, robot, _on_ticks(options, _gait(options, options.begin, robot, model)))
-    if after is not None and start.gait is not None and not run.actuator.linear:
-        if start.gait.pressure_kpa != after.gait.pressure_kpa:
-            raise InputError("effects make the actuators nonlinear: both gaits must have the same pressure")
+    pressures = {gait.pressure_kpa for gait in (start.gait, after.gait if after else None) if gait}
+    if len(pressures) > 1 and not run.actuator.linear:
+        raise InputError("effects make the actuators nonlinear: both gaits must have the same pressure")
     return Task(start, end, options.objective, space, bounds, options.longest)
 
 
