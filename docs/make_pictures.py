@@ -19,6 +19,7 @@ EXAMPLES = (
     "drive_factor",
     "best_lag",
     "fastest_gait",
+    "soft_strobes",
     "tightest_turn",
     "slim_gait_gap",
     "ros_map",

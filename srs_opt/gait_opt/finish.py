@@ -27,7 +27,8 @@ def topped(
     """Return what the switch times' optimization made of `gait`, and the finished gait's certificate, orbits.
 
     The mesh sees band and curvature at some instants only: where the finished gait exceeds a limit, less is
-    asked for by as much. Where the optimum is worth less on ticks than the given gait, that is kept.
+    asked for by as much. Where the optimum is worth less on ticks than the given gait, or only that gets a
+    certificate, the given one is kept.
     """
     asked, given = problem, gait
     for _ in range(_ROUNDS):
@@ -40,11 +41,14 @@ def topped(
         asked, gait = less, exact.gait
     plain = finished(problem, given)
     before = _score(problem, plain)
-    if score(problem, orbits[0].gait, orbits).total < before.total - _LOST * before.scale:
-        # a millisecond further a soft body may come to rest in another orbit: then what was given is kept
+    worse = score(problem, orbits[0].gait, orbits).total < before.total - _LOST * before.scale
+    if worse or (not certificate.passed and orbits[0].gait != plain):
+        # a millisecond further a soft body may settle in another orbit: then what was given is kept
         known = orbits_of(problem, plain)
-        exact = Polished(plain, known, before, tuple(o.speed_m_s for o in known), exact.steps)
-        certificate, orbits = certify(problem, plain, exact.claimed_m_s)
+        speeds = tuple(o.speed_m_s for o in known)
+        kept, known = certify(problem, plain, speeds)
+        if worse or kept.passed:
+            return Polished(plain, known, before, speeds, exact.steps), kept, known
     return exact, certificate, orbits
 
 
