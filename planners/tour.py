@@ -94,11 +94,13 @@ def _summary(record: dict[str, Any]) -> str:
     lines = [
         "",
         f"In {record['seconds']:.0f} s:",
-        f"- fastest gait: {best:.3f} m/s at {gait['frequency_hz']:.2f} Hz and "
+        *_soft(gait["robust_speed_at_stiffness"], "robust gait, whatever the segments' stiffness"),
+        f"- fastest gait of a rigid body: {best:.3f} m/s at {gait['frequency_hz']:.2f} Hz and "
         f"{gait['pressure_kpa']:.1f} kPa, {best / baseline:.1f} x the published {baseline:.3f} m/s",
         f"- map of {gaits['points']} gaits: up to {gaits['speed_max_m_s']:.3f} m/s, "
         f"radius down to {gaits['radius_min_m']:.3f} m",
     ]
+    lines[-1:-1] = _soft(gait["speed_at_stiffness"], "the same gait on bodies that bend")
     if plan["status"] == "solved":
         lines.append(
             f"- maze {MAZE}: solved by {plan['planner']} in {plan['planning_s']:.2f} s, "
@@ -114,6 +116,15 @@ def _summary(record: dict[str, Any]) -> str:
             f"closest {1000 * execution['smallest_clearance_m']:.0f} mm to a wall"
         )
     return "\n".join(lines)
+
+
+def _soft(entries: list[dict[str, Any]], what: str) -> list[str]:
+    """Return a gait's speeds on soft bodies as one line, none for a robot that has a stiffness."""
+    if not entries:
+        return []
+    speeds = ", ".join("none" if e["speed_m_s"] is None else f"{e['speed_m_s']:.3f}" for e in entries)
+    stiffnesses = ", ".join(f"{e['ei_n_m2']:g}" for e in entries)
+    return [f"- {what}: {speeds} m/s at {stiffnesses} N m^2"]
 
 
 def _next(out: Path) -> str:

@@ -286,6 +286,7 @@ def _run_table(options: argparse.Namespace) -> Answer:
     from srs_opt.gait_opt.family import TABLE_PRESSURE_KPA, build_table
     from srs_opt.gait_opt.figures import draw_pareto
     from srs_opt.gait_opt.goal import Limits
+    from srs_opt.gait_opt.report import if_soft, soft_speeds
     from srs_opt.gait_opt.table import save_table
     from srs_opt.judge.bodies import check_judge
     from srs_opt.judge.opinion import Case, opinions
@@ -317,17 +318,18 @@ def _run_table(options: argparse.Namespace) -> Answer:
     if limits == Limits(pressure_kpa=TABLE_PRESSURE_KPA):  # then `plan` may take it without being told
         files.append(save_table(table, cached_table_path(robot, model)))
     shutil.rmtree(unfinished, ignore_errors=True)
-    best = max(g.speed_m_s for g in table.gaits)
+    fastest = max(table.gaits, key=lambda g: g.speed_m_s)
     radii = [abs(g.radius_m) for g in table.gaits if g.radius_m is not None]
     answer: dict[str, Any] = {
         "objective": "table",
         "gaits": len(table.gaits),
-        "speed_max_m_s": best,
+        "speed_max_m_s": fastest.speed_m_s,
+        **soft_speeds(robot, fastest.gait, limits),
         "radius_min_m": min(radii, default=None),
         "band_min_m": min(sum(g.envelope_m) for g in table.gaits),
         "solve_s": seconds,
     }
-    words = f"{len(table.gaits)} gaits up to {best:.3f} m/s in {seconds:.0f} s"
+    words = f"{len(table.gaits)} gaits up to {fastest.speed_m_s:.3f} m/s in {seconds:.0f} s"
     good = True
     if options.judge:
         say(options, "asking the other engine")
@@ -337,7 +339,7 @@ def _run_table(options: argparse.Namespace) -> Answer:
         agree = sum(opinion.agrees for opinion in found)
         words += f"; the other engine agrees about {agree} of them"
         good = agree == len(found)
-    return Answer(answer, words, good, tuple(files))
+    return Answer(answer, "\n".join([words, *if_soft(answer, "the fastest")]), good, tuple(files))
 
 
 def main(argv: list[str] | None = None) -> int:

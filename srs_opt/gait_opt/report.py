@@ -7,10 +7,12 @@ from typing import Any
 
 from srs_opt.gait import Gait
 from srs_opt.gait_opt.collocation.problem import CycleProblem
+from srs_opt.gait_opt.goal import Limits
 from srs_opt.gait_opt.robust import published_orbit
 from srs_opt.gait_opt.score import transport_cost
 from srs_opt.gait_opt.search import Found
 from srs_opt.gait_opt.softness import STIFFNESSES_N_M2, robust_beside, speeds_at_stiffness
+from srs_opt.robot import Robot
 
 _PRICES_TOLD = 4  # the dearest limits; the JSON has all
 _NOTHING_BEYOND = 0.5  # % of speed that rounding and the search's tolerance explain
@@ -69,7 +71,7 @@ def record(problem: CycleProblem, found: Found, solve_s: float, compile_s: float
         "switches": switches(gait),
         "robots": _robots(problem, found),
         "worst_robot": found.certificate.worst_robot.name,
-        **soft_speeds(problem, gait),
+        **soft_speeds(problem.robots[0], gait, problem.limits if problem.goal.only_fast else None),
         "baseline": baseline(problem),
         "certificate": found.certificate.record(),
         "starts": len(found.merits),
@@ -92,15 +94,14 @@ def _robots(problem: CycleProblem, found: Found) -> list[dict[str, Any]]:
     ]
 
 
-def soft_speeds(problem: CycleProblem, gait: Gait) -> dict[str, Any]:
+def soft_speeds(robot: Robot, gait: Gait, beside: Limits | None) -> dict[str, Any]:
     """Return the speeds that a rigid robot's gait would have if its segments had a stiffness.
 
-    Beside them those of the robust gait, for straight gaits of robots with as many segments; both are empty
-    for robots that have a stiffness.
+    Those of the robust gait inside the limits `beside` are there too, if these are given and the robot has as
+    many segments; all are empty for robots that have a stiffness.
     """
-    robot, goal = problem.robots[0], problem.goal
-    beside = robust_beside(robot, problem.limits) if goal.only_fast else None
-    gaits = [gait] if beside is None else [gait, beside]
+    other = None if beside is None else robust_beside(robot, beside)
+    gaits = [gait] if other is None else [gait, other]
     own, *robust = speeds_at_stiffness(robot, gaits)
 
     def listed(speeds: list[float | None]) -> list[dict[str, float | None]]:
@@ -136,7 +137,7 @@ def summary(answer: dict[str, Any]) -> str:
         *_scattered(answer),
         *_each_robot(answer),
         *_from_rest(answer),
-        *_if_soft(answer),
+        *if_soft(answer),
         *_judged(certificate),
     ]
     lines += [f"  {failure}" for failure in certificate["failures"]]
@@ -174,7 +175,7 @@ def _from_rest(answer: dict[str, Any]) -> list[str]:
     ]
 
 
-def _if_soft(answer: dict[str, Any]) -> list[str]:
+def if_soft(answer: dict[str, Any], gait: str = "this gait") -> list[str]:
     """Say what a rigid robot's gait, and the robust gait, would make if the segments yielded."""
 
     def words(entries: list[dict[str, Any]]) -> str:
@@ -186,7 +187,7 @@ def _if_soft(answer: dict[str, Any]) -> list[str]:
     if not own:
         return []
     stiffnesses = ", ".join(f"{e['ei_n_m2']:g}" for e in own)
-    lines = [f"  rigid actuators assumed: at {stiffnesses} N m^2 this gait makes {words(own)} m/s"]
+    lines = [f"  rigid actuators assumed: at {stiffnesses} N m^2 {gait} makes {words(own)} m/s"]
     if robust:
         lines += [
             f"  the robust gait {words(robust)} m/s: for segments of unknown stiffness (--stiffness EI...)"
