@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,7 +82,6 @@ def cost_map(
     Nodes nearer to a wall than half the body's width less the little by which the centre of mass of a bent
     body leaves its centre line are blocked.
     """
-    from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import dijkstra
 
     xmin, ymin, xmax, ymax = field.bounds
@@ -97,29 +97,47 @@ def cost_map(
     reach, speed = speed_by_room(table)
     per_node = per_metre(slowness(room, reach, speed), room)
     free = room > blocked
-    index = np.arange(rows * columns).reshape(rows, columns)
-    starts, ends, costs = [], [], []
-    for di, dj in _STEPS:
+    clear = np.zeros((rows, columns, len(_STEPS)), dtype=bool)
+    for step, (di, dj) in enumerate(_STEPS):
         a = (slice(max(0, -di), rows - max(0, di)), slice(max(0, -dj), columns - max(0, dj)))
         b = (slice(max(0, di), rows + min(0, di)), slice(max(0, dj), columns + min(0, dj)))
         ok = free[a] & free[b]
         for part in (1 / 3, 2 / 3) if abs(di) + abs(dj) > 2 else (1 / 2,):
             between = (1 - part) * nodes[a][ok] + part * nodes[b][ok]
             ok[ok] = field.clearance(between) > blocked
-        starts.append(index[a][ok])
-        ends.append(index[b][ok])
-        costs.append(math.hypot(di, dj) * spacing * (per_node[a][ok] + per_node[b][ok]) / 2)
+        clear[..., step][a] = ok
     away = goal.distance(nodes).ravel()
     sources = np.flatnonzero((away <= 0) & free.ravel())
     if not sources.size:  # a goal smaller than the grid
         sources = np.array([np.where(free.ravel(), away, np.inf).argmin()])
-    count = rows * columns
-    graph = coo_matrix(
-        (np.concatenate(costs), (np.concatenate(starts), np.concatenate(ends))), shape=(count, count)
-    )
-    seconds = dijkstra(graph.tocsr(), directed=False, indices=sources, min_only=True)
+    graph = _graph(clear, per_node, spacing)
+    del nodes, room, per_node, clear, away  # large maps: the search needs the room
+    seconds = dijkstra(graph, directed=False, indices=sources, min_only=True)
     seconds = np.where(np.isfinite(seconds), seconds, BLOCKED_S).reshape(rows, columns)
     return CostMap(seconds, (float(x[0]), float(y[0])), spacing)
+
+
+def _graph(clear: NDArray[np.bool_], per_node: Array, spacing: float) -> Any:
+    """Return the clear steps (rows, columns, steps) as a sparse matrix of their prices.
+
+    Its arrays are filled in place, row by row of the matrix: with lists of edges the memory of large maps
+    would be three times as much.
+    """
+    from scipy.sparse import csr_matrix
+
+    rows, columns, _ = clear.shape
+    count = rows * columns
+    begins = np.zeros(count + 1, dtype=np.int32)
+    np.cumsum(clear.reshape(count, -1).sum(axis=1), out=begins[1:])
+    ends, costs = np.empty(begins[-1], dtype=np.int32), np.empty(begins[-1])
+    following, per_metre = begins[:-1].copy(), per_node.ravel()
+    for step, (di, dj) in enumerate(_STEPS):
+        here = np.flatnonzero(clear[..., step])
+        there, slot = here + di * columns + dj, following[here]
+        ends[slot] = there
+        costs[slot] = math.hypot(di, dj) * spacing * (per_metre[here] + per_metre[there]) / 2
+        following[here] += 1
+    return csr_matrix((costs, ends, begins), shape=(count, count))
 
 
 def slowness(room: Array, reach: Array, speed: Array) -> Array:
