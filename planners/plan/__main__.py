@@ -146,9 +146,9 @@ def run(options: argparse.Namespace) -> Answer:
     if options.planner != "auto":
         planner_named(options.planner)
     true_robot = load_robot(options.true_robot) if options.true_robot else None
-    problem = problem_from(options)
     if options.judge:
-        check_judge([true_robot or problem.robot])
+        check_judge([true_robot or load_robot(options.robot)])
+    problem = problem_from(options)
     wish = Wish(options.planner, options.seed, options.time_limit, options.best)
     result = solve(problem, wish, lambda message: say(options, message))
     record = result.to_record(problem)
