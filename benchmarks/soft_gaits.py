@@ -78,8 +78,9 @@ def run(quick: bool) -> Section:
     for ei in STIFFNESSES[:5] if quick else STIFFNESSES:
         robot = body(ei)
         published = published_wave(robot, 2.0, 55.0).gait()
-        own = Gait.of_record(best[ei]["gait"])
-        speeds = [speed(robot, gait) for gait in (published, rigid, own, robust_gait())]
+        own = Gait.of_record(best[ei]["gait"]) if ei in best else None
+        gaits = (published, rigid, own, robust_gait())
+        speeds = [None if gait is None else speed(robot, gait) for gait in gaits]
         for curve, value in zip(curves.values(), speeds):
             curve.append(value)
         shown = ["–" if v is None else f"{v:.3f}" for v in speeds]
