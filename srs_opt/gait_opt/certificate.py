@@ -9,7 +9,14 @@ import numpy as np
 
 from srs_opt.gait import Gait
 from srs_opt.gait_opt.collocation.problem import CycleProblem
-from srs_opt.gait_opt.goal import LEAST_TURN_RAD_S, STRAIGHT_RAD_S, TURN_ERROR, Goal, Limits
+from srs_opt.gait_opt.goal import (
+    FREQUENCY_EXCESS,
+    LEAST_TURN_RAD_S,
+    STRAIGHT_RAD_S,
+    TURN_ERROR,
+    Goal,
+    Limits,
+)
 from srs_opt.gait_opt.score import broken_constraints, evaluated, robot_scores
 from srs_opt.model.effects import all_effects
 from srs_opt.orbit.attractors import other_orbits
@@ -238,7 +245,7 @@ def _ranges_left(limits: Limits, gait: Gait) -> list[str]:
             ("frequency", gait.frequency_hz, limits.frequency_hz, "Hz"),
             ("pressure", gait.pressure_kpa, limits.pressure_kpa, "kPa"),
         )
-        if not low * (1 - 2e-3) <= value <= high * (1 + 2e-3)
+        if not low * (1 - FREQUENCY_EXCESS) <= value <= high * (1 + FREQUENCY_EXCESS)
     ]
 
 

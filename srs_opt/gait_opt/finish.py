@@ -11,9 +11,11 @@ from srs_opt.gait_opt.aim import aimed, evened, on_ticks
 from srs_opt.gait_opt.certificate import LIMIT_EXCESS, SPEED_ERROR, Certificate, certify
 from srs_opt.gait_opt.collocation.problem import CycleProblem
 from srs_opt.gait_opt.ladder import Report, orbits_of
+from srs_opt.gait_opt.prices import of_ticks
 from srs_opt.gait_opt.score import Score, score
 from srs_opt.gait_opt.starts import turn_miss
 from srs_opt.gait_opt.switch_times import Polished, collocated_speeds, optimize_switch_times
+from srs_opt.gait_opt.tick_search import searched_on_ticks
 from srs_opt.orbit.steady import Orbit
 
 _TURN_RAD_S = 5e-3
@@ -33,13 +35,13 @@ def topped(
     asked, given = problem, gait
     for _ in range(_ROUNDS):
         exact = optimize_switch_times(asked, gait, reach, report)
-        played = finished(asked, exact.gait)
+        played = finished(problem, exact.gait)
         certificate, orbits = certify(problem, played, _claimed(problem, exact, played))
         less = _less_asked(problem, asked, orbits)
         if less is None:
             break
         asked, gait = less, exact.gait
-    plain = finished(problem, given)
+    plain = rounded(problem, given)
     before = _score(problem, plain)
     worse = score(problem, orbits[0].gait, orbits).total < before.total - _LOST * before.scale
     if worse or (not certificate.passed and orbits[0].gait != plain):
@@ -49,6 +51,9 @@ def topped(
         kept, known = certify(problem, plain, speeds)
         if worse or kept.passed:
             return Polished(plain, known, before, speeds, exact.steps), kept, known
+    lost = exact.score.total - score(problem, orbits[0].gait, orbits).total
+    if lost > _LOST * exact.score.scale:
+        exact = replace(exact, prices=(of_ticks(problem, lost), *exact.prices))
     return exact, certificate, orbits
 
 
@@ -79,6 +84,15 @@ def _less_asked(problem: CycleProblem, asked: CycleProblem, orbits: tuple[Orbit,
 
 
 def finished(problem: CycleProblem, gait: Gait) -> Gait:
+    """Return the gait on ticks; where rounding costs something, the best one that a search on ticks finds."""
+    near = rounded(problem, gait)
+    exact = _score(problem, gait)
+    if _score(problem, near).total > exact.total - _LOST * exact.scale:
+        return near
+    return searched_on_ticks(problem, gait, near)
+
+
+def rounded(problem: CycleProblem, gait: Gait) -> Gait:
     """Return the gait on ticks, with the turn that rounding and discretization moved put right."""
     goal, limits = problem.goal, problem.limits
     exact = gait

@@ -17,6 +17,7 @@ LEAST_TURN_RAD_S = 0.05  # of a turn whose side is wanted and nothing else
 TURN_ERROR = 0.02  # share by which a wanted radius or turn rate may be missed
 STRAIGHT_RAD_S = 0.02  # turn rate below which a gait counts as straight
 SIDES = {"left": 1.0, "right": -1.0}
+FREQUENCY_EXCESS = 2e-3  # share by which a period of whole ticks may leave the frequency limits
 LEAST_TICKS = 4  # in a period: fewer hold no wave
 CHAMBER_OVER_WIDTH = 1 / 6  # assumed diameter of an air chamber over the body's width
 
@@ -175,6 +176,12 @@ class Limits:
                 f"a tick of {self.tick_s:g} s is too long: the longest period, {1 / slow:g} s, must hold "
                 f"{LEAST_TICKS} of them at least"
             )
+        least, most = tick_counts(self.frequency_hz, self.tick_s)
+        if least > most:
+            raise InputError(
+                f"no period of whole ticks of {self.tick_s:g} s lies within {slow:g} ... {fast:g} Hz; the "
+                f"nearest are {1 / (least * self.tick_s):.4g} and {1 / (most * self.tick_s):.4g} Hz"
+            )
         if self.min_dwell_s * 2 * self.frequency_hz[0] > 1:
             raise InputError(
                 f"a dwell of {self.min_dwell_s:g} s leaves no room for two switches in the longest period, "
@@ -185,6 +192,18 @@ class Limits:
         """Return the limits with the robot's own chamber volume filled in."""
         volume = self.chamber_volume_m3
         return replace(self, chamber_volume_m3=chamber_volume_m3(robot) if volume is None else volume)
+
+
+def tick_counts(frequency_hz: tuple[float, float], tick_s: float) -> tuple[int, int]:
+    """Return the fewest and most whole ticks of a period within the frequency limits.
+
+    Where no whole number lies strictly within, `FREQUENCY_EXCESS` of the limits is used up.
+    """
+    fewest, longest = 1 / frequency_hz[1] / tick_s, 1 / frequency_hz[0] / tick_s
+    least, most = math.ceil(fewest - 1e-6), math.floor(longest + 1e-6)
+    if least <= most:
+        return least, most
+    return math.ceil(fewest / (1 + FREQUENCY_EXCESS)), math.floor(longest / (1 - FREQUENCY_EXCESS))
 
 
 def chamber_volume_m3(robot: Robot) -> float:

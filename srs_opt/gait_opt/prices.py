@@ -77,6 +77,14 @@ def prices(problem: CycleProblem, p: Program, solution: Solution, merit_unit: fl
     return tuple(sorted(worth, key=lambda price: -price.merit))
 
 
+def of_ticks(problem: CycleProblem, merit: float) -> Price:
+    """Return what the controller's tick costs: the merit by which a gait between ticks is better."""
+    aim, tick_ms = problem.goal.aim, 1e3 * problem.limits.tick_s
+    cost = f"{merit * aim.unit_per_merit:.2g} {aim.unit or 'merit'}"
+    words = f"a tick of {tick_ms:g} ms costs {cost} against switches at any time"
+    return Price("the tick", -tick_ms, "ms", merit, words)
+
+
 def _of_rows(
     problem: CycleProblem, p: Program, solution: Solution, merit_unit: float
 ) -> list[tuple[str, float, str, float]]:
