@@ -1,4 +1,4 @@
-"""Optimization on the controller's ticks: rounded gaits of several periods, then local search by simulation."""
+"""Optimization on the controller's ticks: rounded gaits of several periods, then search by simulation."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from srs_opt.gait_opt.goal import tick_counts
 from srs_opt.gait_opt.ladder import orbits_of
 from srs_opt.gait_opt.score import score
 
-# Periods about the optimum's, in ticks: half miss the even period beside an odd one, double cost more than they find
+# Periods about the optimum's, in ticks: half miss the even period beside an odd one, double find no more
 _PERIODS = 4
 _SEARCHED = 2  # starts from which the search goes on
 _MOST_TRIALS = 220  # simulations per start; a search on four segments ends after about half of them
@@ -78,8 +78,8 @@ def searched_on_ticks(problem: CycleProblem, gait: Gait, rounded: Gait) -> Gait:
     """Return the best gait on ticks near `gait`, or `rounded`, which stands on them, where none is better.
 
     Gaits of the nearest periods are rounded, and even ones made exactly even; from the best of them single
-    switches, whole intervals, the rest of the wave and the pressure move by a tick (a step) for as long as the
-    simulated score grows.
+    switches, whole intervals, the rest of the wave and the pressure move by a tick (a step) for as long as
+    the simulated score grows.
     """
     search = _Search(problem, max(math.ceil(problem.limits.min_dwell_s / problem.limits.tick_s - 1e-6), 1))
     starts = {search.value(start): start for start in _starts(problem, gait, rounded)}
