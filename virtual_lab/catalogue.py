@@ -97,7 +97,7 @@ _LISTED = (
     _listed("hysteresis", "ratio width", 0.35, False, "bending", width=4.0),
     _listed("viscous_rolling", "damping", 0.06, False, "wheels"),
     _listed("stribeck", "excess speed", 1.0, False, "wheels", speed=0.08),
-    _listed("reverse_friction", "excess", 1.0, False, "wheels"),
+    _listed("reverse_friction", "excess", 2.0, False, "wheels"),
     _listed("slip_rate", "per_speed", 8.0, False, "wheels"),
     _listed("floor_slope", "angle direction", 0.006, False, "room"),
     _listed("head_mass", "extra_kg", 0.02, True, "body"),

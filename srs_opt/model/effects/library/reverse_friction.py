@@ -14,7 +14,7 @@ BLUR_M_S = 2e-4
 EFFECT = Effect(
     "reverse_friction",
     "ground",
-    (EffectParameter("excess", "", 1.0, lower=0),),
+    (EffectParameter("excess", "", 2.0, lower=0),),
     what="a link that moves backwards along its wheels meets more friction than forwards, as with worn "
     "ratchets or with scales: the coefficient's excess over the forward one, as a share of it",
     look="tow the unpowered robot forwards and backwards: the forces differ",
