@@ -91,7 +91,11 @@ def build_parser() -> Parser:
         action="store_true",
         help="ask another physics engine about the result (extra 'judge'); the certificate carries its word",
     )
-    how.add_argument("--warm", metavar="FILE", help="start from the gait of an earlier run (its gait.json)")
+    how.add_argument(
+        "--warm",
+        metavar="FILE",
+        help="start from an earlier run's gait.json; with --table, its gait_table.json on this --tick",
+    )
     return parser
 
 
@@ -278,16 +282,18 @@ def _run_table(options: argparse.Namespace) -> Answer:
         raise InputError("--table is built for one robot: without --stiffness, --robots and --worst")
     import shutil
     import time
+    from functools import partial
 
     from srs_opt.controller.c_source import write_program
     from srs_opt.controller.program import Program
     from srs_opt.gait_opt.catalogue import cached_table_path
+    from srs_opt.gait_opt.entries import reticked_table
     from srs_opt.gait_opt.export import write_csv
     from srs_opt.gait_opt.family import TABLE_PRESSURE_KPA, build_table
     from srs_opt.gait_opt.figures import draw_pareto
     from srs_opt.gait_opt.goal import Limits
     from srs_opt.gait_opt.report import if_soft, soft_speeds
-    from srs_opt.gait_opt.table import save_table
+    from srs_opt.gait_opt.table import load_table, save_table
     from srs_opt.judge.bodies import check_judge
     from srs_opt.judge.opinion import Case, opinions
     from srs_opt.robot import load_robot
@@ -299,11 +305,14 @@ def _run_table(options: argparse.Namespace) -> Answer:
     begun = time.perf_counter()
     limits = limits_from(options)
     unfinished = options.out / "table.unfinished"  # an interrupted table goes on from here
+    where = {"jobs": options.jobs, "cluster": options.cluster}
     try:
-        table = build_table(
-            robot, model, limits, lambda text: say(options, text),
-            jobs=options.jobs, cluster=options.cluster, resume=unfinished,
-        )  # fmt: skip
+        if options.warm:
+            table = reticked_table(
+                robot, load_table(options.warm, robot), limits, partial(say, options), **where
+            )
+        else:
+            table = build_table(robot, model, limits, partial(say, options), resume=unfinished, **where)
     except KeyboardInterrupt:
         kept = len(list(unfinished.glob("*.json")))
         say(options, f"\n{kept} optimizations are kept in {unfinished}; the same command goes on from there")
@@ -315,7 +324,9 @@ def _run_table(options: argparse.Namespace) -> Answer:
         write_program(Program.of_table(table, options.tick), options.out / "gait_table.h"),
         *draw_pareto(table, options.out / "pareto"),
     ]
-    if limits == Limits(pressure_kpa=TABLE_PRESSURE_KPA):  # then `plan` may take it without being told
+    if (
+        limits == Limits(pressure_kpa=TABLE_PRESSURE_KPA) and not options.warm
+    ):  # then `plan` may take it without being told
         files.append(save_table(table, cached_table_path(robot, model)))
     shutil.rmtree(unfinished, ignore_errors=True)
     fastest = max(table.gaits, key=lambda g: g.speed_m_s)

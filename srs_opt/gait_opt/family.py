@@ -12,6 +12,7 @@ from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait, published_wave
 from srs_opt.gait_opt.aim import end_for_end, in_step
 from srs_opt.gait_opt.collocation.problem import CycleProblem
+from srs_opt.gait_opt.entries import certified_table
 from srs_opt.gait_opt.finish import finished
 from srs_opt.gait_opt.goal import LEAST_SPEED_M_S, STRAIGHT_RAD_S, Goal, Limits
 from srs_opt.gait_opt.ladder import Climb, Rung, climb, ladder
@@ -56,7 +57,7 @@ def build_table(
     cluster: str | None = None,
     resume: Path | None = None,
 ) -> GaitTable:
-    """Return the table of `robot`: optimized left turns and straights, their images, all re-simulated.
+    """Return the table of `robot`: optimized left turns and straights, their images, all certified.
 
     Wishes out of reach are left out, and said so. With the folder `resume`, gaits found there are not
     optimized again; it is left for the caller to remove.
@@ -84,8 +85,10 @@ def build_table(
     gaits = tuple(entry for wish in asked for entry in entries[wish.name])
     if not gaits:
         raise NoAnswerError(f"no gait of the table is within reach of robot '{robot.name}'")
-    say(f"{len(gaits)} gaits from {len(asked)} optimizations")
-    return GaitTable(robot.name, robot.fingerprint(), model, gaits)
+    table = GaitTable(robot.name, robot.fingerprint(), model, gaits)
+    table = certified_table(robot, table, work.limits, say, jobs=jobs, cluster=cluster)
+    say(f"{len(table.gaits)} gaits from {len(asked)} optimizations, all certified")
+    return table
 
 
 def _fulfilled(work: Work, tasks: Sequence[Task]) -> list[dict[str, Any]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,28 @@ from srs_opt.robot import Robot
 VERSION = 1
 # Half the step between the table's speeds; half of it refuses what is nearly there, double plays what is not.
 NEAR_M_S = 0.05
+
+
+@dataclass(frozen=True)
+class EntryCertificate:
+    """What simulation found of an entry that passed; see `RobotCertificate` for the checks.
+
+    Attributes
+    ----------
+    periodicity_gap, largest_floquet_multiplier, standing_start_m_s : float
+    self_clearance_m : float or None
+        Least room between parts of the body that are not neighbours; None for a body too short to have any.
+    """
+
+    periodicity_gap: float
+    largest_floquet_multiplier: float
+    standing_start_m_s: float
+    self_clearance_m: float | None
+
+    def settling_s(self, period_s: float) -> float:
+        """Return the time in which a disturbance decays to 1/e: -period / ln(largest multiplier)."""
+        multiplier = self.largest_floquet_multiplier
+        return -period_s / math.log(multiplier) if multiplier > 0 else 0.0
 
 
 @dataclass(frozen=True)
@@ -39,6 +62,8 @@ class TableGait:
         Rigid displacement per cycle, in the frame of the pose (centre of mass, mean heading) at its start.
     friction_work_j : float
         Per cycle.
+    certificate : EntryCertificate, optional
+        None where the motion is taken from the model without one.
     """
 
     name: str
@@ -49,6 +74,12 @@ class TableGait:
     envelope_m: tuple[float, float]
     displacement: tuple[float, float, float]
     friction_work_j: float
+    certificate: EntryCertificate | None = None
+
+    @property
+    def settling_s(self) -> float | None:
+        """Time in which what a change of gait disturbs decays to 1/e; None without a certificate."""
+        return None if self.certificate is None else self.certificate.settling_s(self.gait.period_s)
 
     @staticmethod
     def of_orbit(name: str, orbit: Orbit) -> TableGait:
@@ -67,6 +98,7 @@ class TableGait:
 
     def record(self) -> dict[str, Any]:
         """Return the entry as JSON holds it."""
+        found = self.certificate
         return {
             "name": self.name,
             **self.gait.record(),
@@ -76,6 +108,7 @@ class TableGait:
             "envelope_m": list(self.envelope_m),
             "displacement": list(self.displacement),
             "friction_work_j": self.friction_work_j,
+            **({} if found is None else {"settling_s": self.settling_s, "certificate": dict(vars(found))}),
         }
 
     @staticmethod
@@ -92,6 +125,7 @@ class TableGait:
             (right, left),
             (dx, dy, turn),
             record["friction_work_j"],
+            EntryCertificate(**record["certificate"]) if "certificate" in record else None,
         )
 
 

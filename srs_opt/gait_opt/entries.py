@@ -1,0 +1,159 @@
+"""Entries of gait tables certified by simulation, and moved to another controller's tick."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import casadi as ca
+
+from srs_opt.errors import NoAnswerError
+from srs_opt.gait_opt.aim import in_step
+from srs_opt.gait_opt.certificate import certify, self_clearance_m
+from srs_opt.gait_opt.collocation.problem import CycleProblem
+from srs_opt.gait_opt.finish import finished
+from srs_opt.gait_opt.goal import STRAIGHT_RAD_S, Goal, Limits
+from srs_opt.gait_opt.objectives.cycle import GaitCycle
+from srs_opt.gait_opt.objectives.objective import Objective
+from srs_opt.gait_opt.table import EntryCertificate, GaitTable, TableGait
+from srs_opt.parallel import executor
+from srs_opt.parallel.sweep import sweep
+from srs_opt.robot import Robot
+
+Say = Callable[[str], None]
+_LEVER_M = 0.1  # weighs turn rates against speeds, as `GaitTable.nearest`
+_BAND_WEIGHT = 2.0  # m/s per metre of band: 5 mm wider is as bad as 1 cm/s off
+
+# What a table says of a gait is its motion: whether that is what was wished for is decided before.
+_ANY_MOTION = Objective("entry", lambda cycle: cycle.speed_m_s, turn="any")
+
+
+def certified_table(
+    robot: Robot,
+    table: GaitTable,
+    limits: Limits,
+    say: Say = lambda text: None,
+    *,
+    jobs: int = 1,
+    cluster: str | None = None,
+) -> GaitTable:
+    """Return the table with every entry's certificate; entries that fail are left out, and said so.
+
+    Raises
+    ------
+    NoAnswerError
+        If none passes.
+    """
+    work = partial(_certified, _Work(robot, table.model, limits))
+    return _kept(table, _each(work, table, jobs, cluster), say)
+
+
+def reticked_table(
+    robot: Robot,
+    table: GaitTable,
+    limits: Limits,
+    say: Say = lambda text: None,
+    *,
+    jobs: int = 1,
+    cluster: str | None = None,
+) -> GaitTable:
+    """Return the table on ticks of `limits.tick_s`: of every entry the gait whose motion is nearest to it.
+
+    Every entry is certified on its new ticks. Pressure and frequency keep the entry's own as limits where
+    `limits` are narrower.
+
+    Raises
+    ------
+    NoAnswerError
+        If no entry passes.
+    """
+    work = partial(_reticked, _Work(robot, table.model, limits))
+    return _kept(table, _each(work, table, jobs, cluster), say)
+
+
+@dataclass(frozen=True)
+class _Work:
+    robot: Robot
+    model: str
+    limits: Limits
+
+
+def _each(
+    work: Callable[[Sequence[TableGait]], list[tuple[TableGait | None, str]]],
+    table: GaitTable,
+    jobs: int,
+    cluster: str | None,
+) -> list[tuple[TableGait | None, str]]:
+    with executor(jobs, cluster) as where:
+        return list(sweep(work, list(table.gaits), chunk=8, where=where))
+
+
+def _kept(table: GaitTable, results: list[tuple[TableGait | None, str]], say: Say) -> GaitTable:
+    for entry, (kept, line) in zip(table.gaits, results):
+        if kept is None:
+            say(f"{entry.name}: left out, {line}")
+    gaits = tuple(kept for kept, _ in results if kept is not None)
+    if not gaits:
+        raise NoAnswerError(f"no gait of the table passes its certificate: {results[0][1]}")
+    return replace(table, gaits=gaits)
+
+
+def _certified(work: _Work, entries: Sequence[TableGait]) -> list[tuple[TableGait | None, str]]:
+    return [_certificate(work, entry) for entry in entries]
+
+
+def _certificate(work: _Work, entry: TableGait) -> tuple[TableGait | None, str]:
+    """Return the entry with its certificate and "", or None and what failed."""
+    problem = CycleProblem((work.robot,), work.model, Goal(_ANY_MOTION), work.limits)
+    try:
+        certificate, (orbit,) = certify(problem, entry.gait, (entry.speed_m_s,))
+    except NoAnswerError as error:
+        return None, str(error)
+    if not certificate.passed:
+        return None, "; ".join(certificate.failures)
+    found = certificate.robots[0]
+    clearance = self_clearance_m(work.robot, orbit, work.model)
+    kept = EntryCertificate(
+        found.periodicity_gap,
+        found.largest_floquet_multiplier,
+        found.standing_start_m_s,
+        clearance if clearance < float("inf") else None,
+    )
+    return replace(entry, certificate=kept), ""
+
+
+def _reticked(work: _Work, entries: Sequence[TableGait]) -> list[tuple[TableGait | None, str]]:
+    return [_on_ticks(work, entry) for entry in entries]
+
+
+def _on_ticks(work: _Work, entry: TableGait) -> tuple[TableGait | None, str]:
+    limits, gait = work.limits, entry.gait
+    (slow, fast), (weak, strong) = limits.frequency_hz, limits.pressure_kpa
+    wide = replace(
+        limits,
+        frequency_hz=(min(slow, gait.frequency_hz), max(fast, gait.frequency_hz)),
+        pressure_kpa=(min(weak, gait.pressure_kpa), max(strong, gait.pressure_kpa)),
+    )
+    straight = entry.radius_m is None or abs(entry.turn_rate_rad_s) < STRAIGHT_RAD_S
+    like = Objective("entry", _likeness(entry), turn="any")
+    goal = replace(Goal(like), turn_rate_rad_s=0.0) if straight else Goal(like)
+    problem = CycleProblem((work.robot,), work.model, goal, wide)
+    try:
+        near = in_step(finished(problem, gait), limits.tick_s)
+        (orbit,) = certify(problem, near, (entry.speed_m_s,))[1]
+    except NoAnswerError as error:
+        return None, str(error)
+    return _certificate(replace(work, limits=wide), TableGait.of_orbit(entry.name, orbit))
+
+
+def _likeness(entry: TableGait) -> Callable[[GaitCycle], ca.SX]:
+    """Return the merit of moving as the entry does, in no wider a band."""
+    speed, turn, band = entry.speed_m_s, entry.turn_rate_rad_s, sum(entry.envelope_m)
+
+    def merit(cycle: GaitCycle) -> ca.SX:
+        wider = ca.fmax(cycle.band_m - band, 0)
+        off = ca.hypot(cycle.speed_m_s - speed, _LEVER_M * (cycle.turn_rate_rad_s - turn))
+        return -off - _BAND_WEIGHT * wider
+
+    return merit
