@@ -76,7 +76,7 @@ def test_slopes_of_a_robots_own_effects_are_those_of_whole_solutions():
 
 def test_maps_refit_an_effect_of_the_robot_and_say_which_they_cannot_show(tmp_path, capsys):
     truth = draw_truth(("tether_drag",), np.random.default_rng(5))
-    design = small_design(np.random.default_rng(4), 3.0)
+    design = small_design(np.random.default_rng(4), 3.0)[:8]
     write_dataset(tmp_path / "maps", truth, design, 6, Recording(maps=True, tracks=False))
     robot = tmp_path / "maps" / "robot.yaml"
     slope = {"name": "floor_slope", "angle": 0.001, "direction": 0.0, "sd": {"angle": 0.01}}
