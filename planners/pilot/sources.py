@@ -6,6 +6,7 @@ import contextlib
 import math
 import socket
 import struct
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any
 
@@ -20,7 +21,7 @@ MOST_COMPLAINTS = 3  # about malformed input; more only repeat themselves
 FRAME_OF_DATA = 7  # NatNet's message identifier
 
 
-class _Packets:
+class _Packets(ABC):
     """A bound UDP socket, read without waiting."""
 
     def __init__(self, host: str, port: int, clock: Clock, complain: Callable[[str], None]) -> None:
@@ -56,8 +57,9 @@ class _Packets:
                 if self._complaints <= MOST_COMPLAINTS:
                     self._complain(f"note: {error}")
 
+    @abstractmethod
     def _parse(self, packet: bytes, arrived_s: float) -> list[Report]:
-        raise NotImplementedError
+        """Return the reports in one packet."""
 
 
 class UdpPoses(_Packets):

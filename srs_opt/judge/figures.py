@@ -25,24 +25,17 @@ def draw_opinions(found: Sequence[Opinion], stem: Path) -> tuple[Path, Path]:
     known = [o for o in found if o.ours.speed_m_s is not None]
     agrees = np.array([o.agrees for o in known], dtype=bool)
     t = found[0].tolerance
-    _panel(
-        speed,
-        np.array([o.ours.speed_m_s for o in known], dtype=float),
-        np.array([o.judge.speed_m_s for o in known]),
-        agrees,
-        (t.speed_share, t.speed_m_s),
-        1e3,
-    )
+    for axes, name, tolerance, unit in (
+        (speed, "speed_m_s", (t.speed_share, t.speed_m_s), 1e3),
+        (turn, "turn_rate_rad_s", (t.turn_share, t.turn_rate_rad_s), 1.0),
+    ):
+        ours, theirs = (
+            np.array([getattr(seen, name) for seen in side], dtype=float)
+            for side in ([o.ours for o in known], [o.judge for o in known])
+        )
+        _panel(axes, ours, theirs, agrees, tolerance, unit)
     speed.set_xlabel("our speed (m/s)")
     speed.set_ylabel("the engine's less ours (mm/s)")
-    _panel(
-        turn,
-        np.array([o.ours.turn_rate_rad_s for o in known], dtype=float),
-        np.array([o.judge.turn_rate_rad_s for o in known]),
-        agrees,
-        (t.turn_share, t.turn_rate_rad_s),
-        1.0,
-    )
     turn.set_xlabel("our turn rate (rad/s)")
     turn.set_ylabel("the engine's less ours (rad/s)")
     figure.suptitle(f"{int(agrees.sum())} of {len(found)} gaits agree (band: tolerance)", fontsize=9)
