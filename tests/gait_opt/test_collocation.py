@@ -109,29 +109,33 @@ def test_closed_form_curvature_is_the_settled_response(tau2):
             x, clock = done.y[:, -1], clock + duration
 
 
+def held_gait(case, orbit, elements):
+    """Solve with an orbit's gait held and the turn free: program, unknowns and their scales."""
+    gait = orbit.gait
+    switches = switches_of(gait, gait.intervals[0][0][0])
+    order = switch_order(switches)
+    mesh, times = phase_times(switches, order, phase_cuts(switches, order, ENDS, elements * ENDS))
+    p = case.program(mesh.elements, times)
+    z, scales = unknowns_from_orbits(p.layout, list(case.robots), [orbit], mesh)
+    (low, high), rows = case.bounds(p)
+    held = slice(0, 2 + p.layout.switches)
+    low[held] = high[held] = z[held]
+    turn = p.layout.unknown(0, "turn_rate")
+    low[turn], high[turn] = -10, 10
+    solution = p.solve(z, case.parameters(p, mesh, scales, 0.03), (low, high), rows)
+    assert solution.converged
+    return p, solution.z, scales
+
+
 def test_collocation_converges_to_the_simulated_orbit():
     """With the gait held, the program's speed approaches the simulation's as elements are added."""
     smooth = replace(ROBOT, friction_speed_m_s=0.03)
     orbit = steady_gait(smooth, GAIT)
-    switches = switches_of(GAIT, GAIT.intervals[0][0][0])
-    order = switch_order(switches)
+    case = CycleProblem((smooth,), "complex", Goal("turn", turn_rate_rad_s=orbit.turn_rate_rad_s), Limits())
     errors = []
     for elements in (16, 48):
-        cuts = phase_cuts(switches, order, ENDS, elements * ENDS)
-        mesh, times = phase_times(switches, order, cuts)
-        case = CycleProblem(
-            (smooth,), "complex", Goal("turn", turn_rate_rad_s=orbit.turn_rate_rad_s), Limits()
-        )
-        p = case.program(mesh.elements, times)
-        z, scales = unknowns_from_orbits(p.layout, [smooth], [orbit], mesh)
-        (low, high), rows = case.bounds(p)
-        held = slice(0, 2 + p.layout.switches)
-        low[held] = high[held] = z[held]
-        turn = p.layout.unknown(0, "turn_rate")
-        low[turn], high[turn] = -10, 10
-        solution = p.solve(z, case.parameters(p, mesh, scales, 0.03), (low, high), rows)
-        assert solution.converged
-        errors.append(abs(solution.z[p.layout.unknown(0, "speed")] / orbit.speed_m_s - 1))
+        p, z, _ = held_gait(case, orbit, elements)
+        errors.append(abs(z[p.layout.unknown(0, "speed")] / orbit.speed_m_s - 1))
     assert errors[1] < 2e-4
     assert errors[1] < errors[0] / 3
 

@@ -4,13 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_collocation import ENDS, derivative_errors
+from test_collocation import derivative_errors, held_gait
 
 from srs_opt.gait import Wave, published_wave
 from srs_opt.gait_opt import from_rest
-from srs_opt.gait_opt.collocation.guess import switches_of, unknowns_from_orbits
+from srs_opt.gait_opt.collocation.guess import unknowns_from_orbits
 from srs_opt.gait_opt.collocation.layout import Mesh
-from srs_opt.gait_opt.collocation.phases import phase_cuts, phase_times, switch_order
 from srs_opt.gait_opt.collocation.problem import CycleProblem
 from srs_opt.gait_opt.goal import Goal, Limits
 from srs_opt.gait_opt.ladder import Rung, Step, climb, orbits_of
@@ -42,23 +41,12 @@ def test_collocated_bends_converge_to_the_simulated_orbit():
     smooth = replace(SOFT, friction_speed_m_s=0.03)
     gait = Wave(1.9, 43.0, (0.0, 1.1, 2.18, 2.85), (0.0, 0.1, 0.0, 0.0)).gait()
     orbit = steady_gait(smooth, gait)
-    switches = switches_of(gait, gait.intervals[0][0][0])
-    order = switch_order(switches)
+    case = problem(smooth, objective="turn", turn_rate_rad_s=orbit.turn_rate_rad_s)
     errors = []
     for elements in (12, 48):
-        mesh, times = phase_times(switches, order, phase_cuts(switches, order, ENDS, elements * ENDS))
-        case = problem(smooth, objective="turn", turn_rate_rad_s=orbit.turn_rate_rad_s)
-        p = case.program(mesh.elements, times)
-        z, scales = unknowns_from_orbits(p.layout, [smooth], [orbit], mesh)
-        (low, high), rows = case.bounds(p)
-        held = slice(0, 2 + p.layout.switches)
-        low[held] = high[held] = z[held]
-        turn = p.layout.unknown(0, "turn_rate")
-        low[turn], high[turn] = -10, 10
-        solution = p.solve(z, case.parameters(p, mesh, scales, 0.03), (low, high), rows)
-        assert solution.converged
-        errors.append(abs(solution.z[p.layout.unknown(0, "speed")] / orbit.speed_m_s - 1))
-        bends = solution.z[p.layout.states(0)].reshape(p.layout.points, -1)[:, 6:10] * scales[0][6:10]
+        p, z, scales = held_gait(case, orbit, elements)
+        errors.append(abs(z[p.layout.unknown(0, "speed")] / orbit.speed_m_s - 1))
+        bends = z[p.layout.states(0)].reshape(p.layout.points, -1)[:, 6:10] * scales[0][6:10]
     assert errors[1] < 1e-4
     assert errors[1] < errors[0] / 3
     assert np.abs(bends).max() == pytest.approx(np.abs(orbit.kappa).max(), rel=0.02)
