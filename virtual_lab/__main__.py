@@ -16,7 +16,18 @@ from virtual_lab.errors import LabError
 
 PROG = "python -m virtual_lab"
 # sizes beyond which nothing snake-like is left to simulate, or a data set fills the computer
-MOST = {"scale": 20.0, "bench_error": 5.0, "duration": 600.0, "rate": 1e4, "noise": 1.0, "stated_noise": 1.0}
+MOST = {
+    "scale": 20.0,
+    "bench_error": 5.0,
+    "duration": 600.0,
+    "rate": 1e4,
+    "noise": 1.0,
+    "stated_noise": 1.0,
+    "correlated_noise": 1.0,
+    "correlation": 600.0,
+    "drift": 1.0,
+    "systematic": 1.0,
+}
 
 
 class _Parser(argparse.ArgumentParser):
@@ -89,6 +100,30 @@ def build_parser() -> argparse.ArgumentParser:
         help="noise that dataset.yaml claims, m (default: the truth)",
     )
     add("--lost", type=_number, default=0.01, metavar="P", help="share of lost markers (default 0.01)")
+    add(
+        "--correlated-noise",
+        type=_number,
+        default=0.0,
+        metavar="M",
+        help="further noise per coordinate that is correlated in time, m",
+    )
+    add("--correlation", type=_number, default=0.2, metavar="S", help="its correlation time, s (default 0.2)")
+    add("--drift", type=_number, default=0.0, metavar="M", help="how far the picture creeps in a trial, m")
+    add("--outliers", type=_number, default=0.0, metavar="P", help="share of positions that are elsewhere")
+    add("--swaps", type=_number, default=0.0, metavar="P", help="share of frames with two labels exchanged")
+    add(
+        "--systematic",
+        type=_number,
+        default=0.0,
+        metavar="M",
+        help="smooth error that repeats with the gait, root mean square, m",
+    )
+    add(
+        "--wrong-entry",
+        default="",
+        metavar="KIND",
+        help="one trial is not what trials.csv says: phase_sign, frequency or other_robot",
+    )
     add("--no-scatter", action="store_true", help="friction and curvature do not scatter from trial to trial")
     add("--centre-of-mass", action="store_true", help="tracks of the centre of mass alone")
     add("--bench", action="store_true", help="also bench/: steps, spring car, tow, checks")
@@ -161,6 +196,13 @@ def make(options: argparse.Namespace) -> dict[str, object]:
         bench=options.bench,
         maps=options.maps or options.maps_only,
         tracks=not options.maps_only,
+        correlated_sd_m=options.correlated_noise,
+        correlation_s=options.correlation,
+        drift_m=options.drift,
+        outlier_share=options.outliers,
+        swap_share=options.swaps,
+        systematic_sd_m=options.systematic,
+        wrong_entry=options.wrong_entry,
     )
     documented = truth.documented["effects"]
     folder = write_dataset(options.out, truth, trials, options.seed, recording)

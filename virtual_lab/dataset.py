@@ -14,6 +14,7 @@ import yaml
 from virtual_lab.assemble import Factors
 from virtual_lab.bench import write_bench
 from virtual_lab.camera import centre_picture, label_times, measured, picture
+from virtual_lab.disturb import WRONG_ENTRIES, Disturbances, disturbed, mistaken
 from virtual_lab.errors import LabError
 from virtual_lab.files import whole_folder, write_table, write_text
 from virtual_lab.maps import COLUMNS, map_rows
@@ -34,8 +35,8 @@ MAX_RATE_HZ = 1e5
 
 
 @dataclass(frozen=True)
-class Recording:
-    """How the laboratory records.
+class Recording(Disturbances):
+    """How the laboratory records, and what its camera and notebook add.
 
     Attributes
     ----------
@@ -51,6 +52,8 @@ class Recording:
         Whether to write bench/, maps.csv, and trials.csv with trials/.
     replicates : int
         Runs of each gait of maps.csv.
+    wrong_entry : {"", "phase_sign", "frequency", "other_robot"}
+        What one trial, drawn at random, has wrong: see `mistaken`.
     """
 
     rate_hz: float = 120.0
@@ -62,8 +65,14 @@ class Recording:
     maps: bool = False
     tracks: bool = True
     replicates: int = 3
+    wrong_entry: str = ""
 
     def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.wrong_entry and self.wrong_entry not in WRONG_ENTRIES:
+            raise LabError(
+                f"wrong entry: expected one of {', '.join(WRONG_ENTRIES)}, found '{self.wrong_entry}'"
+            )
         if self.markers not in ("tail_to_head", "centre_of_mass"):
             raise LabError(f"markers must be tail_to_head or centre_of_mass, found '{self.markers}'")
         if (
@@ -102,12 +111,27 @@ def tracks(
     Every trial has its own random numbers, so the tracks of a trial do not depend on the others.
     """
     view = picture if recording.markers == "tail_to_head" else centre_picture
+    wrong, other = _wrong(trials, seed, recording)[1:]
     for number, trial in enumerate(trials):
         rng = np.random.default_rng([seed, 1, number])
         factors = draw_factors(truth.scatter, rng)
+        if number == wrong:
+            factors = Factors(*np.multiply(dataclasses.astuple(factors), dataclasses.astuple(other)))
         labels = label_times(trial.duration_s, recording.rate_hz)
         seen = view(truth, trial, labels, factors)
-        yield trial, labels, measured(seen, recording.marker_sd_m, recording.lost, rng)
+        places = measured(seen, recording.marker_sd_m, recording.lost, rng)
+        # numbers of their own: what is disturbed does not change what is not
+        own, common = np.random.default_rng([seed, 6, number]), np.random.default_rng([seed, 7])
+        yield trial, labels, disturbed(places, trial, labels, recording, recording.marker_sd_m, own, common)
+
+
+def _wrong(
+    trials: Sequence[Trial], seed: int, recording: Recording
+) -> tuple[list[Trial], int | None, Factors]:
+    """Return the trials as noted, which one is wrong (if any), and its robot's factors."""
+    if not recording.wrong_entry:
+        return list(trials), None, Factors()
+    return mistaken(list(trials), recording.wrong_entry, np.random.default_rng([seed, 8]))
 
 
 def write_dataset(
@@ -137,8 +161,9 @@ def write_dataset(
         raise LabError("a data set needs trials, each with its own name")
     with whole_folder(folder) as scratch:
         _write_descriptions(scratch, folder.name, truth, recording)
+        noted, wrong, _ = _wrong(trials, seed, recording)
         if recording.tracks:
-            _write_trials(scratch, trials)
+            _write_trials(scratch, noted)
             for trial, labels, places in tracks(truth, trials, seed, recording):
                 _write_track(scratch / "trials" / f"{trial.name}.csv", labels, places, recording)
         if recording.bench:
@@ -146,6 +171,7 @@ def write_dataset(
         if recording.maps:
             write_table(scratch / "maps.csv", COLUMNS, _map(truth, trials, seed, recording))
     record = {"seed": seed, "truth": truth.to_record(), "recording": dataclasses.asdict(recording)}
+    record["wrong_trial"] = None if wrong is None else trials[wrong].name
     write_text(truth_file(folder), json.dumps(record, indent=1) + "\n")
     return folder
 
