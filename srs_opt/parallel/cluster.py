@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 CONNECT_S = 10.0  # patience with a scheduler that does not answer
 WORKERS_S = 30.0  # patience with a scheduler that has no workers, at the start and later
 POLL_S = 5.0  # between two looks whether there are workers
+GATHER_S = 30.0  # for fetching results that are ready, then whether there are workers is looked at again
 SHARE = 4  # items of one task: enough to fill the lanes of compiled code
 AHEAD = 3  # pieces per thread that are under way
 
@@ -38,9 +39,10 @@ def opened(address: str) -> Iterator[Cluster]:
         from distributed import Client
     except ImportError as error:
         raise InputError("--cluster needs the package 'distributed': pip install srs-opt[cluster]") from error
-    log = logging.getLogger("distributed")
-    before = log.level
-    log.setLevel(logging.CRITICAL + 1)  # what goes wrong is told once, by us
+    logs = [logging.getLogger(name) for name in ("distributed", "asyncio")]
+    before = [log.level for log in logs]
+    for log in logs:
+        log.setLevel(logging.CRITICAL + 1)  # what goes wrong is told once, by us
     try:
         try:
             client = Client(address, timeout=CONNECT_S)
@@ -57,7 +59,8 @@ def opened(address: str) -> Iterator[Cluster]:
             with contextlib.suppress(OSError, TimeoutError):
                 client.close(timeout=CONNECT_S)
     finally:
-        log.setLevel(before)
+        for log, level in zip(logs, before):
+            log.setLevel(level)
 
 
 class Cluster:
@@ -130,8 +133,7 @@ class Cluster:
             while True:
                 try:
                     wait(tasks, timeout=POLL_S)
-                    self._alone_since = None
-                    return list(self._client.gather(list(tasks)))
+                    return self._gathered(tasks)
                 except (NotYet, TimeoutError):
                     self._look_for_workers()
         except (CancelledError, Cancelled, CommClosedError) as error:
@@ -144,6 +146,15 @@ class Cluster:
                 f"--cluster {self._address}: one piece of work killed several workers, one after the other "
                 "(out of memory?)"
             ) from error
+
+    def _gathered(self, tasks: Sequence[Future]) -> list[Any]:
+        """Fetch results that are ready. A limit of time: if the worker that holds one is lost meanwhile, the
+        scheduler hands the work out anew, and waits for ever where no worker is left."""
+
+        async def gather() -> list[Any]:
+            return list(await self._client.gather(list(tasks), asynchronous=True))
+
+        return list(self._client.sync(gather, callback_timeout=GATHER_S))
 
     def _look_for_workers(self) -> None:
         if self._client.nthreads():

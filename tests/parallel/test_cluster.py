@@ -123,3 +123,20 @@ def test_all_workers_lost_is_told(monkeypatch):
         cluster.scale(0)
         with pytest.raises(NoAnswerError, match="all workers were lost"):
             list(results)
+
+
+def test_a_result_lost_with_its_worker_is_told(monkeypatch):
+    """A result is ready, but nobody is left from whom it could be fetched."""
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr(dask, "WORKERS_S", 0.0)
+    monkeypatch.setattr(distributed, "wait", lambda tasks, timeout: None)
+
+    class Alone:
+        def nthreads(self):
+            return {}
+
+        def sync(self, function, callback_timeout):
+            raise TimeoutError
+
+    with pytest.raises(NoAnswerError, match="all workers were lost"):
+        dask.Cluster(Alone(), "somewhere").results([None])
