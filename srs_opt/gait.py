@@ -92,7 +92,12 @@ class Gait:
         inner = [t for t in self.switch_times_s() if _COINCIDENT_S < t < self.period_s - _COINCIDENT_S]
         edges = np.array([0.0, *inner, self.period_s])
         middles = (edges[:-1] + edges[1:]) / 2
-        return np.diff(edges), np.stack([self.valve(t) for t in middles], axis=1)
+        valve = np.full((self.segments, middles.size), -1.0)
+        for row, intervals in zip(valve, self.intervals):
+            for on, off in intervals:
+                after, before = middles >= on, middles < off
+                row[after & before if on < off else after | before] = 1.0
+        return np.diff(edges), valve
 
     def shortest_dwell_s(self) -> float:
         """Return the shortest time for which any valve stays on or off (infinite without switches)."""

@@ -23,18 +23,26 @@ from planners.motion.table import body_in_room
 from planners.motion.valves import STAIR_S
 from planners.search.problem import ROUNDING_M, Problem
 from planners.search.tree import Root, arrival_index, at_rest
+from srs_opt.errors import NoAnswerError
 from srs_opt.model.outline import POINTS_PER_ARC
 from srs_opt.simulate.integrate import Trajectory
 from srs_opt.simulate.shapes import centre_lines
+from srs_opt.simulate.together import Search, together
 
 Array = NDArray[np.float64]
-# Of the coarsest integration, body lengths per second: at two lengths per second it errs by 0.0004 in 40.
-TOLERANCE = 4.24e-5
+# Of the coarsest integration, body lengths per second: at two lengths per second it errs by 0.0001 in 40.
+# With four times as much, most mazes of 16 x 16 cells ask for a third tolerance, in twice the time.
+TOLERANCE = 1.06e-5
+# Of the ramps of pressure; with the search's stairs they alone would err by 2 mm in 20 m.
+CERTIFIED_STAIR_S = STAIR_S / 4
 FINER = 16.0  # twice as many steps
-LEVELS = 5  # tolerances at most; the last errs by a micrometre in a hundred metres
+LEVELS = 4  # tolerances at most; the last errs by a few micrometres in a hundred metres
 RATIO = 4.0  # of the errors of two levels at least; 15 to 113 was seen over 94 m. 2 would double the bound
 SHARE = 0.1  # of the clearance, that the bound may be
+COMPARED = 4  # every so many nodes of the coarser one: errors change within cycles, not within steps
 EXACT_BELOW = 0.127  # body lengths of clearance; above, the table's lower bound will do
+# Body lengths of margin below which the body is looked at twice as often: every 2 ms it moves 0.004 of them.
+SMALL_MARGIN = 0.0127
 
 
 @dataclass(frozen=True)
@@ -103,46 +111,51 @@ class Certifier:
 
     def certify(self, gaits: Sequence[int]) -> Certificate:
         """Judge a sequence of gaits, a cycle each."""
-        coarse = self._played(gaits, 0)
+        small = self.problem.margin_m < SMALL_MARGIN * self.problem.robot.length_m
         for level in range(1, LEVELS):
-            fine = self._played(gaits, level)
+            coarse, fine = self._played(gaits, (level - 1, level))
             # nodes twice as dense make integration better, not geometry
-            seen = [_thinned(t, 2 ** (level - 1)) for t in fine]
-            certificate, sure = self._judged(gaits, seen, coarse)
+            seen = [_thinned(t, 2 ** (level - 1 if small else level)) for t in fine]
+            certificate, sure = self._judged(gaits, seen, self._error_m(fine, coarse))
             if sure:
                 break
-            coarse = seen
         return certificate
 
-    def _played(self, gaits: Sequence[int], level: int) -> list[Trajectory]:
-        """Return the trajectories of all cycles, integrated with a level's tolerance."""
-        known = self._known[level]
-        coarsest = TOLERANCE * self.problem.robot.length_m
-        same = 0
-        while same < min(len(gaits), len(known.gaits)) and gaits[same] == known.gaits[same]:
-            same += 1
-        cycles = known.cycles[:same]
-        state = cycles[-1].final if cycles else self.root.state
-        before = gaits[same - 1] if same else self.root.gait
-        for gait in gaits[same:]:
-            timeline = self.problem.joints.timeline(before, gait, STAIR_S / FINER ** (level / 2))
-            played = self.problem.run.run(timeline, state, coarsest / FINER**level)
-            cycles.append(self.problem.bent(played, before, gait))
-            before, state = gait, cycles[-1].final
-        self._known[level] = _Played(list(gaits), cycles)
-        return cycles
+    def _played(self, gaits: Sequence[int], levels: tuple[int, int]) -> list[list[Trajectory]]:
+        """Return the trajectories of all cycles, integrated with two levels' tolerances side by side."""
+        for level in levels:
+            self._known[level].keep(gaits)
+        for index in range(len(gaits)):
+            wanting = [level for level in levels if len(self._known[level].cycles) <= index]
+            found = together([self._cycle(gaits, index, level) for level in wanting])
+            for level, cycle in zip(wanting, found):
+                if isinstance(cycle, NoAnswerError):
+                    raise cycle
+                self._known[level].cycles.append(cycle)
+        return [self._known[level].cycles for level in levels]
+
+    def _cycle(self, gaits: Sequence[int], index: int, level: int) -> Search[Trajectory]:
+        """Find one cycle, as a search, from where the one before it ends."""
+        problem, known = self.problem, self._known[level]
+        before, now = gaits[index - 1] if index else self.root.gait, gaits[index]
+        state = known.cycles[index - 1].final if index else self.root.state
+        timeline = problem.joints.timeline(before, now, CERTIFIED_STAIR_S / FINER ** (level / 2))
+        tolerance = TOLERANCE * problem.robot.length_m / FINER**level
+        played = yield from problem.run.travel(timeline, state, tolerance)
+        return problem.bent(played, before, now)
 
     def _judged(
-        self, gaits: Sequence[int], fine: list[Trajectory], coarse: list[Trajectory]
+        self, gaits: Sequence[int], cycles: list[Trajectory], bound: tuple[Array, Array]
     ) -> tuple[Certificate, bool]:
         """Return the certificate, and whether a finer integration would not change it for the better."""
         problem, root = self.problem, self.root
-        time, pose, kappa, cycle = _joined(fine)
+        time, pose, kappa, cycle = _joined(cycles)
         lines = body_in_room(centre_lines(problem.run, kappa), pose)
         arrived = arrival_index(problem.goal, pose)
         last = len(time) if arrived is None else arrived + 1
         time, pose, lines, kappa, cycle = time[:last], pose[:last], lines[:last], kappa[:last], cycle[:last]
-        error = self._error_m(fine, coarse)[:last]
+        until_s, error_m = bound
+        error = error_m[np.searchsorted(until_s, time).clip(max=until_s.size - 1)]
         seen = clearances(problem, lines)
         room = seen - error
         unseen = np.zeros(last)
@@ -166,7 +179,7 @@ class Certifier:
             away = float(problem.goal.distance(pose[-1, :2]))
             reason = f"the centre of mass ends {1e3 * away:.1f} mm short of the goal"
             failed = len(gaits) - 1
-        states = tuple(t.final for t in fine)
+        states = tuple(t.final for t in cycles)
         worst = float(error.max())
         certificate = Certificate(
             failed is None, reason, float(room.min()), worst, between, failed, time, pose, lines, room, cycle,
@@ -176,24 +189,35 @@ class Certifier:
             return certificate, worst <= SHARE * float(seen.min())
         return certificate, arrived is None or bool((seen + error < wanted).any())
 
-    def _error_m(self, fine: list[Trajectory], coarse: list[Trajectory]) -> Array:
-        """Return the bound at every node of the finer integration: how far the coarser one was off so far."""
+    def _error_m(self, fine: list[Trajectory], coarse: list[Trajectory]) -> tuple[Array, Array]:
+        """Return instants, and how far the coarser integration has been off until then over RATIO."""
         run = self.problem.run
-        apart = [np.zeros(1)]
-        for one, other in zip(fine, coarse):
-            pose, kappa = other.at(one.time_s[1:])
-            here = body_in_room(centre_lines(run, one.kappa[1:]), one.pose[1:])
-            there = body_in_room(centre_lines(run, kappa), pose)
-            apart.append(np.hypot(*(here - there).transpose(2, 0, 1)).max(axis=1))
-        return np.maximum.accumulate(np.concatenate(apart)) / RATIO
+        # the finer nodes lie a millisecond apart: what a line between two of them misses is a micrometre
+        time, *fine_columns, _ = _joined(fine)
+        at, pose, kappa, _ = _joined([_thinned(t, COMPARED) for t in coarse])
+        fine_pose, fine_kappa = (
+            np.stack([np.interp(at, time, column) for column in columns.T], axis=1)
+            for columns in fine_columns
+        )
+        here = body_in_room(centre_lines(run, fine_kappa), fine_pose)
+        there = body_in_room(centre_lines(run, kappa), pose)
+        apart = np.hypot(*(here - there).transpose(2, 0, 1)).max(axis=1)
+        return at, np.maximum.accumulate(apart) / RATIO
 
 
-@dataclass(frozen=True)
+@dataclass
 class _Played:
     """Gaits and the trajectories of their cycles."""
 
-    gaits: list[int]
+    gaits: Sequence[int]
     cycles: list[Trajectory]
+
+    def keep(self, gaits: Sequence[int]) -> None:
+        """Keep what these gaits begin with."""
+        same = 0
+        while same < min(len(gaits), len(self.cycles)) and gaits[same] == self.gaits[same]:
+            same += 1
+        self.gaits, self.cycles = list(gaits), self.cycles[:same]
 
 
 def _thinned(trajectory: Trajectory, stride: int) -> Trajectory:
