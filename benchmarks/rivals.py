@@ -26,7 +26,7 @@ def _c_program() -> Path:
         raise RuntimeError("the floor needs a C compiler")
     program = Path(tempfile.mkdtemp(prefix="c_loop")) / "c_loop"
     source = Path(__file__).parent / "c_loop.c"
-    subprocess.run([cc[0], "-O3", str(source), "-o", str(program), "-lm"], check=True)
+    subprocess.run([*cc[0], "-O3", str(source), "-o", str(program), "-lm"], check=True)
     return program
 
 

@@ -11,6 +11,7 @@ import json
 import os
 import re
 import sys
+import unicodedata
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -122,6 +123,8 @@ def run_command(
     No traceback reaches a user; with SRS_OPT_TRACEBACK set, that of a bug does.
     """
     _ready_streams()
+    _end_on_sigterm()
+    os.environ["MPLBACKEND"] = "agg"  # commands draw into files; a backend that is not there would stop them
     options = parser.parse_args(argv)
     try:
         if options.out is None:
@@ -136,9 +139,9 @@ def run_command(
         if options.json:
             print(json.dumps(answer.record, allow_nan=False))
         elif not options.quiet:
-            print(answer.summary)
+            print(visible(answer.summary))
             for path in answer.files:
-                print(f"  wrote {path}")
+                print(visible(f"  wrote {path}"))
         sys.stdout.flush()
         return 0 if answer.good else 1
     except InputError as error:
@@ -152,6 +155,9 @@ def run_command(
     except KeyboardInterrupt:
         print(f"\n{parser.prog}: interrupted; nothing half-written was left behind", file=sys.stderr)
         return 130
+    except Terminated:
+        print(f"{parser.prog}: terminated; nothing half-written was left behind", file=sys.stderr)
+        return 143
     except BrokenPipeError:
         _close_output()
         return 141
@@ -178,6 +184,23 @@ def run_command(
             file=sys.stderr,
         )
         return FAULT
+
+
+class Terminated(BaseException):
+    """SIGTERM came: what is under way is cleared up, as after Ctrl-C."""
+
+
+def _end_on_sigterm() -> None:
+    """Let SIGTERM unwind the program, so that temporary files and child processes go with it."""
+    import signal
+    import threading
+
+    def end(number: int, frame: Any) -> NoReturn:
+        raise Terminated
+
+    ours = threading.current_thread() is threading.main_thread()
+    if ours and signal.getsignal(signal.SIGTERM) == signal.SIG_DFL:
+        signal.signal(signal.SIGTERM, end)
 
 
 def _is_own(module: str | None) -> bool:
@@ -212,13 +235,18 @@ def _close_output() -> None:
 
 def one_line(error: BaseException) -> str:
     """Return the message of `error` on a single line."""
-    return " ".join(str(error).split())
+    return visible(" ".join(str(error).split()))
+
+
+def visible(text: str) -> str:
+    """Return `text` with control characters written out: a name in a file must not steer the terminal."""
+    return "".join(c if c in "\n\t" or unicodedata.category(c) != "Cc" else f"\\x{ord(c):02x}" for c in text)
 
 
 def say(options: argparse.Namespace, message: str) -> None:
     """Tell the person something on stderr, unless --quiet."""
     if not options.quiet:
-        print(message, file=sys.stderr, flush=True)
+        print(visible(message), file=sys.stderr, flush=True)
 
 
 def progress(

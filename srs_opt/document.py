@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import difflib
 import json
-import math
 import re
-from collections.abc import Iterator
+import sys
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import lru_cache
 from importlib import resources
@@ -98,7 +98,7 @@ def parse_yaml(text: str, source: str, what: str) -> Document:
     """Parse YAML `text`; `source` is named in complaints."""
     loader = None
     try:
-        _check_depth(text)
+        _check_size(text, source)
         loader = _Loader(text)
         node = loader.get_single_node()
         lines: dict[Place, int] = {}
@@ -120,7 +120,7 @@ def parse_yaml(text: str, source: str, what: str) -> Document:
     finally:
         if loader is not None:
             loader.dispose()
-    return Document(source, value, lines)
+    return _checked(Document(source, value, lines))
 
 
 def read_json(path: Path | str, what: str) -> Document:
@@ -133,17 +133,22 @@ def read_json(path: Path | str, what: str) -> Document:
     """
     text = read_text(path, what)
     try:
-        return Document(str(path), json.loads(text))
+        return _checked(Document(str(path), json.loads(text)))
     except json.JSONDecodeError as error:
         raise InputError(f"{path}:{error.lineno}: not valid JSON: {error.msg} (expected {what})") from error
     except RecursionError as error:
         raise InputError(f"{path}: nested too deeply (expected {what})") from error
 
 
-def _check_depth(text: str) -> None:
-    """Raise RecursionError for deep nesting: composing recurses, in the C parser without a guard."""
+def _check_size(text: str, source: str) -> None:
+    """Refuse too many values before anything is built of them (a minute and gigabytes).
+
+    Raises RecursionError for deep nesting: composing recurses, in the C parser without a guard.
+    """
     depth = 0
-    for event in yaml.parse(text, Loader=_Loader):
+    for number, event in enumerate(yaml.parse(text, Loader=_Loader)):
+        if number > 2 * MAX_VALUES:  # a value is an event, a list or a mapping two
+            raise InputError(f"{source}: more than {MAX_VALUES} values in it")
         depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
         if depth > MAX_DEPTH:
             raise RecursionError
@@ -202,8 +207,7 @@ def violations(document: Document, schema: dict[str, Any]) -> list[InputError]:
 
     if document.value is None:
         return [document.error((), f"is empty (expected {_TYPES.get(schema.get('type', ''), 'content')})")]
-    bad = list(islice(_not_finite(document.value, ()), MOST_VIOLATIONS))
-    found = [document.error(place, "must be a finite number") for place in bad]
+    found: list[InputError] = []
     validator = jsonschema.Draft202012Validator(schema)
     errors = list(islice(validator.iter_errors(document.value), MOST_VIOLATIONS))
     for error in sorted(errors, key=lambda e: (e.validator != "additionalProperties", len(e.absolute_path))):
@@ -214,7 +218,7 @@ def violations(document: Document, schema: dict[str, Any]) -> list[InputError]:
             known = sorted(error.schema.get("properties", {}))
             unknown = [str(k) for k in error.instance if k not in known]
             found += [document.error((*place, k), unknown_word("key", k, known)) for k in unknown]
-        elif place not in bad:
+        else:
             found.append(document.error(place, _plain(error)))
     return found
 
@@ -226,16 +230,35 @@ def unknown_word(kind: str, word: str, known: list[str]) -> str:
     return f"unknown {kind} '{word[:60]}' ({hint})"
 
 
-def _not_finite(value: Any, place: Place) -> Iterator[Place]:
-    if isinstance(value, float) and not math.isfinite(value):
-        yield place
-    children: list[tuple[str | int, Any]] = []
+def _checked(document: Document) -> Document:
+    """Return `document`; what no format means is refused for all of them: inf, nan, half a character."""
+    for place, complaint in _unusable(document.value, ()):
+        raise document.error(place, complaint)
+    return document
+
+
+def _unusable(value: Any, place: Place) -> Iterator[tuple[Place, str]]:
+    if isinstance(value, (int, float)) and not abs(value) <= sys.float_info.max:
+        yield place, "must be a finite number"
+    if isinstance(value, str) and not _is_unicode(value):
+        yield place, "must be text in Unicode, found a lone surrogate"
+    children: Iterable[tuple[str | int, Any]] = ()
     if isinstance(value, dict):
-        children = list(value.items())
+        children = value.items()
     elif isinstance(value, list):
-        children = list(enumerate(value))
+        children = enumerate(value)
     for key, child in children:
-        yield from _not_finite(child, (*place, key))
+        if isinstance(key, str) and not _is_unicode(key):
+            yield place, "has a key that is no text in Unicode: a lone surrogate"
+        yield from _unusable(child, (*place, key))
+
+
+def _is_unicode(text: str) -> bool:
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 _TYPES = {

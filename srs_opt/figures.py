@@ -74,6 +74,7 @@ def new_figure(
 @styled
 def save_figure(figure: Figure, stem: Path | str, *, dpi: int = 200) -> tuple[Path, Path]:
     """Write `figure` as ``stem.png`` and ``stem.svg``, atomically."""
+    plain_names(figure)
     stem = Path(stem)
     targets = (stem.with_name(stem.name + ".png"), stem.with_name(stem.name + ".svg"))
     for target in targets:
@@ -81,6 +82,24 @@ def save_figure(figure: Figure, stem: Path | str, *, dpi: int = 200) -> tuple[Pa
             metadata = {"Date": None} if target.suffix == ".svg" else None
             figure.savefig(temporary, dpi=dpi, metadata=metadata)
     return targets
+
+
+def plain_names(figure: Figure) -> None:
+    """Draw every text as it stands: a name may hold a dollar sign, which would begin mathematics.
+
+    The labels of logarithmic axes are matplotlib's own and remain mathematics.
+    """
+    from matplotlib.text import Text
+    from matplotlib.ticker import LogFormatter
+
+    powers: set[Text] = set()
+    for axes in figure.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            if isinstance(axis.get_major_formatter(), LogFormatter):
+                powers.update(axis.get_ticklabels(which="both"))
+    for text in figure.findobj(Text):
+        if text not in powers:
+            text.set_parse_math(False)  # type: ignore[attr-defined]
 
 
 def line_key(label: str, **style: Any) -> Line2D:
@@ -124,6 +143,7 @@ class Picture:
 
 def encoded(figure: Figure, title: str, caption: str) -> Picture:
     """Return a figure as a picture of a page that needs no other file."""
+    plain_names(figure)
     stream = io.BytesIO()
     figure.savefig(stream, format="png", metadata={"Software": None})
     return Picture(title, caption, base64.b64encode(stream.getvalue()).decode("ascii"))

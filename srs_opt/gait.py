@@ -163,6 +163,25 @@ class Gait:
         return replace(self, intervals=flipped)
 
 
+def check_gait(robot: Robot, gait: Gait) -> None:
+    """Check that `robot` can play `gait`.
+
+    Raises
+    ------
+    InputError
+        If the gait drives another number of segments, or its pressure, held, would bend a segment by more
+        than a full turn, where it meets itself.
+    """
+    if gait.segments != robot.segments:
+        raise InputError(f"gait drives {gait.segments} segments, robot '{robot.name}' has {robot.segments}")
+    most_kpa = robot.max_curvature_1_m / robot.curvature_per_pressure_1_m_kpa
+    if gait.pressure_kpa > most_kpa:
+        raise InputError(
+            f"gait: a pressure of {gait.pressure_kpa:g} kPa bends a segment of robot '{robot.name}' by more "
+            f"than a full turn; expected at most {most_kpa:.0f} kPa (is it given in Pa?)"
+        )
+
+
 def _inside(t: float, on: float, off: float) -> bool:
     return on <= t < off if on < off else (t >= on or t < off)
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import zipfile
 from dataclasses import astuple
 from importlib import resources
 from pathlib import Path
@@ -52,34 +51,40 @@ def load_motion(
     cached = cache_folder() / f"motion_{key}_{_equations_digest()}.npz"
     transitions = None
     for place in (Path(str(shipped)), cached):
-        transitions = transitions or _read(place)
+        transitions = transitions or _read(place, len(table.gaits), robot.segments)
     if transitions is None:
-        transitions = simulate_transitions(robot, table, limits, progress)
+        transitions = rounded(simulate_transitions(robot, table, limits, progress))
         write_transitions(cached, transitions)
     return motion_table(robot, table, transitions, limits)
 
 
-def write_transitions(path: Path, transitions: Transitions) -> Path:
-    """Write simulated transitions as a compressed archive, atomically."""
-    rounded = {
+def rounded(transitions: Transitions) -> Transitions:
+    """Return the transitions as they are stored, so that plans made before and after storing are the same."""
+    coarse = {
         name: (np.round(value / _POSE_STEP) * _POSE_STEP).astype(value.dtype)
         for name, value in transitions._asdict().items()
         if name != "kappa"
     }
-    kappa = np.round(transitions.kappa, 3).astype(np.float32)
+    return Transitions(**coarse, kappa=np.round(transitions.kappa, 3).astype(np.float32))
+
+
+def write_transitions(path: Path, transitions: Transitions) -> Path:
+    """Write simulated transitions as a compressed archive, rounded, atomically."""
     with atomic_path(path) as temporary:
-        np.savez_compressed(temporary, kappa=kappa, **rounded)
+        np.savez_compressed(temporary, **rounded(transitions)._asdict())
     return path
 
 
-def _read(path: Path) -> Transitions | None:
+def _read(path: Path, gaits: int, segments: int) -> Transitions | None:
     """Return the stored transitions, or None where there is no file or a broken one (it is made again)."""
     try:
         # by way of memory: numpy leaves the file open when the archive is broken
         with np.load(io.BytesIO(path.read_bytes())) as stored:
-            return Transitions(*(stored[name] for name in Transitions._fields))
-    except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile):
+            found = Transitions(*(stored[name] for name in Transitions._fields))
+    except Exception:  # what a damaged archive raises is the business of zipfile, zlib, numpy and ast
         return None
+    after_each = all(len(array) in (gaits, gaits + 1) and np.isfinite(array).all() for array in found)
+    return found if after_each and found.kappa.shape[1::2] == (gaits, segments) else None
 
 
 def _equations_digest() -> str:

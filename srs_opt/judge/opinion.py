@@ -8,7 +8,7 @@ from functools import partial
 from typing import Any
 
 from srs_opt.errors import InputError, NoAnswerError
-from srs_opt.gait import Gait
+from srs_opt.gait import Gait, check_gait
 from srs_opt.judge.gaits import DEFAULT_SETTINGS, Judged, Settings, judge_gait
 from srs_opt.orbit.steady import steady_gait
 from srs_opt.parallel import executor
@@ -118,8 +118,7 @@ def opinion_on(
     InputError
         If gait and robot do not belong together, or the engine cannot stand for the robot.
     """
-    if gait.segments != robot.segments:
-        raise InputError(f"gait drives {gait.segments} segments, robot '{robot.name}' has {robot.segments}")
+    check_gait(robot, gait)
     judged = judge_gait(robot, gait, settings, refine=refine)
     return Opinion(name, ours_of(robot, gait, model), judged, tolerance)
 

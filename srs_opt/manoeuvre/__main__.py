@@ -165,7 +165,7 @@ def _table(options: argparse.Namespace, robot: Robot, model: str) -> Any:
 
 
 def _gait(options: argparse.Namespace, name: str, robot: Robot, model: str) -> Gait:
-    from srs_opt.errors import InputError
+    from srs_opt.gait import check_gait
     from srs_opt.gait_file import load_gait
 
     if "." not in name and ":" not in name:
@@ -173,8 +173,7 @@ def _gait(options: argparse.Namespace, name: str, robot: Robot, model: str) -> G
         if name in entries:
             return entries[name]
     gait = load_gait(name, options.pressure[1])
-    if gait.segments != robot.segments:
-        raise InputError(f"{name}: gait drives {gait.segments} segments, robot has {robot.segments}")
+    check_gait(robot, gait)
     return gait
 
 

@@ -10,7 +10,7 @@ from functools import lru_cache, partial
 import numpy as np
 
 from srs_opt.errors import InputError, NoAnswerError
-from srs_opt.gait import Gait
+from srs_opt.gait import Gait, check_gait
 from srs_opt.orbit.actuators import actuator_multiplier
 from srs_opt.orbit.motion import CycleMotion, cycle_motion, rotate
 from srs_opt.orbit.solve import PeriodicSolution, search_orbit
@@ -149,7 +149,7 @@ def steady_gaits(
         If a gait and the robot do not belong together.
     """
     for gait in gaits:
-        _check_segments(robot, gait)
+        check_gait(robot, gait)
     work = partial(_side_by_side, robot, model, tolerance)
     with executor(jobs) as where:
         return list(sweep(work, gaits, chunk=CHAINS * CHAIN, where=where))
@@ -184,13 +184,8 @@ def _chain(run: Integrator, gaits: Sequence[Gait], tolerance: float) -> Search[l
     return found
 
 
-def _check_segments(robot: Robot, gait: Gait) -> None:
-    if gait.segments != robot.segments:
-        raise InputError(f"gait drives {gait.segments} segments, robot '{robot.name}' has {robot.segments}")
-
-
 def _search(run: Integrator, gait: Gait, tolerance: float, guess: np.ndarray | None) -> Search[Orbit]:
-    _check_segments(run.robot, gait)
+    check_gait(run.robot, gait)
     return orbit_of(run, gait, (yield from search_orbit(run, gait, tolerance, guess)))
 
 

@@ -13,7 +13,10 @@ import contextlib
 import hashlib
 import os
 import platform
+import shlex
 import shutil
+import signal
+import stat
 import subprocess
 import sys
 import tempfile
@@ -24,6 +27,7 @@ from pathlib import Path
 
 import casadi as ca
 
+from srs_opt.errors import InputError
 from srs_opt.model.effects.own import registered
 
 FLAGS = ("-O1", "-fPIC", "-shared", "-fno-math-errno")
@@ -37,23 +41,32 @@ def cache_folder() -> Path:
     """Return the folder of compiled models (``SRS_OPT_CACHE`` overrides the platform's own place)."""
     import platformdirs
 
-    return Path(os.environ.get("SRS_OPT_CACHE") or platformdirs.user_cache_dir("srs-opt", appauthor=False))
+    wanted = os.environ.get("SRS_OPT_CACHE")
+    if wanted:
+        return Path(wanted).absolute()
+    place = Path(platformdirs.user_cache_dir("srs-opt", appauthor=False))
+    # the base directory specification asks to ignore a relative XDG_CACHE_HOME
+    return place if place.is_absolute() else Path.home() / ".cache" / "srs-opt"
 
 
 @lru_cache(maxsize=1)
-def compiler() -> tuple[str, str] | None:
-    """Return the C compiler and its version line, or None (``SRS_OPT_CC=none`` switches it off)."""
-    wanted = os.environ.get("SRS_OPT_CC") or os.environ.get("CC") or "cc gcc clang"
-    for name in wanted.split():
-        path = shutil.which(name)
+def compiler() -> tuple[tuple[str, ...], str] | None:
+    """Return the C compiler's command and its version line, or None (``SRS_OPT_CC=none`` switches it off).
+
+    The variables may hold options or a wrapper, as with make: ``CC="ccache gcc"``.
+    """
+    wanted = os.environ.get("SRS_OPT_CC") or os.environ.get("CC")
+    for command in [shlex.split(wanted)] if wanted else [["cc"], ["gcc"], ["clang"]]:
+        path = shutil.which(command[0]) if command else None
         if path is None:
             continue
+        command = [path, *command[1:]]
         try:
-            done = subprocess.run([path, "--version"], capture_output=True, text=True, timeout=20, check=True)
+            done = _run([*command, "--version"], timeout_s=20)
         except (OSError, subprocess.SubprocessError):
             continue
-        return path, done.stdout.splitlines()[0] if done.stdout else path
-    print("note: no C compiler found; models run interpreted, about ten times slower", file=sys.stderr)
+        return tuple(command), (done.splitlines() or [path])[0]
+    note_interpreted("no C compiler found")
     return None
 
 
@@ -82,9 +95,17 @@ def compiled(key: str, build: Callable[[], ca.Function], flags: tuple[str, ...] 
     """
     found = shared_library(key, build, _casadi_source, flags)
     if found is not None:
-        with contextlib.suppress(RuntimeError):  # made for another machine
+        try:
             return ca.external(found.stem, str(found))
+        except RuntimeError:  # made for another machine, or a file system without execution
+            note_interpreted(f"{found.parent}: compiled models cannot be loaded from this folder")
     return build()
+
+
+@lru_cache
+def note_interpreted(reason: str) -> None:
+    """Say once that models run interpreted."""
+    print(f"note: {reason}; models run interpreted, about ten times slower", file=sys.stderr)
 
 
 def shared_library(
@@ -101,21 +122,34 @@ def shared_library(
     cc = compiler()
     if cc is None:
         return None
-    parts = [key, _source_digest(), ca.CasadiMeta.version(), platform.machine(), *cc, *flags]
+    parts = [key, _source_digest(), ca.CasadiMeta.version(), platform.machine(), *cc[0], cc[1], *flags]
     if any(name in key for name in registered()):  # their equations are not part of the package's sources
         parts.append(build().serialize())
     path = cache_folder() / f"srs_{hashlib.sha256(chr(0).join(parts).encode()).hexdigest()[:32]}.so"
+    _check_owner(path.parent)
     if path.exists() and _whole(path):
         return path
     started = time.perf_counter()
     try:
-        _compile(source(build(), path.stem), path, [cc[0], *flags])
+        _compile(source(build(), path.stem), path, [*cc[0], *flags])
     except (OSError, subprocess.SubprocessError) as error:
         print(f"note: compiling a model failed ({error}); it runs interpreted, slower", file=sys.stderr)
         return None
     finally:
         compile_seconds += time.perf_counter() - started
     return path
+
+
+def _check_owner(folder: Path) -> None:
+    """Refuse a cache that somebody else can write: its machine code would be run."""
+    if not folder.exists() or not hasattr(os, "getuid"):
+        return
+    status = folder.stat()
+    if status.st_uid not in (os.getuid(), 0) or status.st_mode & stat.S_IWOTH:
+        raise InputError(
+            f"{folder}: others can write into this folder, and compiled models in it would be run; take away "
+            "their permission, or name another folder with SRS_OPT_CACHE"
+        )
 
 
 def _whole(path: Path) -> bool:
@@ -132,15 +166,35 @@ def _whole(path: Path) -> bool:
 
 
 def _compile(source: str, path: Path, command: list[str]) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
+    path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=path.parent, prefix=".building-") as folder:
         file, target = Path(folder) / "model.c", Path(folder) / "model.so"
         file.write_text(source, encoding="utf-8")
         command = [*command, str(file), "-o", str(target), "-lm"]
-        subprocess.run(command, capture_output=True, text=True, check=True, timeout=900)
+        _run(command, timeout_s=900)
         content = target.read_bytes()
         target.write_bytes(content + hashlib.sha256(content).digest())
         os.replace(target, path)
+
+
+def _run(command: list[str], timeout_s: float) -> str:
+    """Run a compiler and return what it prints, in whatever encoding; none of its processes outlives us."""
+    apart = {"start_new_session": True} if os.name == "posix" else {}  # Ctrl-C is ours to pass on
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        encoding="utf-8", errors="replace", **apart,
+    )  # fmt: skip
+    try:
+        out, complaints = process.communicate(timeout=timeout_s)
+    except BaseException:
+        if apart:
+            os.killpg(process.pid, signal.SIGKILL)  # gcc's own processes too
+        process.kill()
+        process.communicate()
+        raise
+    if process.returncode:
+        raise subprocess.CalledProcessError(process.returncode, command, out, complaints)
+    return out
 
 
 def _casadi_source(function: ca.Function, name: str) -> str:

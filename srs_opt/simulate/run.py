@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from srs_opt.errors import InputError
-from srs_opt.gait import Gait
+from srs_opt.gait import Gait, check_gait
 from srs_opt.orbit.motion import CycleMotion, cycle_motion, rotate
 from srs_opt.robot import Robot
 from srs_opt.simulate import compiled
@@ -71,8 +71,7 @@ def simulate(
             f"{duration_s:g} s at {1 / gait.period_s:g} Hz are less than {LEAST_CYCLES:g} cycles; "
             "raise the duration or the frequency"
         )
-    if gait.segments != robot.segments:
-        raise InputError(f"gait drives {gait.segments} segments, robot '{robot.name}' has {robot.segments}")
+    check_gait(robot, gait)
     before = compiled.compile_seconds
     run = Integrator(robot, model)
     start = run.rest(heading_rad=heading_rad)
