@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from srs_opt.errors import InputError, NoAnswerError
+from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait, check_gait
 from srs_opt.judge.gaits import DEFAULT_SETTINGS, Judged, Settings, judge_gait
 from srs_opt.orbit.steady import steady_gait

@@ -9,7 +9,7 @@ from functools import lru_cache, partial
 
 import numpy as np
 
-from srs_opt.errors import InputError, NoAnswerError
+from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait, check_gait
 from srs_opt.orbit.actuators import actuator_multiplier
 from srs_opt.orbit.motion import CycleMotion, cycle_motion, rotate

@@ -179,11 +179,15 @@ def _compile(source: str, path: Path, command: list[str]) -> None:
 
 def _run(command: list[str], timeout_s: float) -> str:
     """Run a compiler and return what it prints, in whatever encoding; none of its processes outlives us."""
-    apart = {"start_new_session": True} if os.name == "posix" else {}  # Ctrl-C is ours to pass on
+    apart = os.name == "posix"  # Ctrl-C is ours to pass on
     process = subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-        encoding="utf-8", errors="replace", **apart,
-    )  # fmt: skip
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        encoding="utf-8",
+        errors="replace",
+        start_new_session=apart,
+    )
     try:
         out, complaints = process.communicate(timeout=timeout_s)
     except BaseException:

@@ -1,4 +1,4 @@
-"""Numbers, names and surroundings that no writer of a file meant: every reader refuses or shows them alike."""
+"""Numbers, names and surroundings that no writer of a file meant: every reader refuses or shows them."""
 
 import json
 import os
