@@ -29,10 +29,11 @@ def build_parser() -> Parser:
     parser = make_parser(
         "python -m srs_opt.discrepancy",
         "Find where simulation and measured data disagree, name the missing effect or abstain, show the gap\n"
-        "shrink on trials that no fit saw. Writes report.html and corrected_robot.yaml.\n"
-        "JSON: verdict (no_gap, named, named_in_part, one_of, unknown, not_testable), effects, believed,\n"
-        "alternatives, alike (pairs of effects that act alike on these data, angle in rad), located,\n"
-        "gap (m, root mean square per coordinate), next_experiment, candidates, corrected_robot, seconds;\n"
+        "shrink on trials that no fit saw. Writes report.html, discrepancy.json and a robot file.\n"
+        "JSON (docs/formats.md): verdict (no_gap, named, named_in_part, described, one_of, unknown,\n"
+        "not_testable), believed, effects, described, alternatives, lead, remainder (m, shares of gap,\n"
+        "speed, radius), would_have_seen, gap (m, root mean square per coordinate), noise, set_aside (trials),\n"
+        "next_experiment, located, alike (pairs of effects, angle in rad), candidates, seconds;\n"
         "with --payoff also payoff (m/s, rad/s; null where nothing was named), with --maze payoff.maze\n"
         "(m, s): plans before and after, both driven on the corrected robot.",
         "python -m srs_opt.discrepancy data/my_set --json",
@@ -98,6 +99,7 @@ def _written(options: argparse.Namespace, found: Discrepancy, maze: Maze | None)
     """Write the corrected robot and the report, whose pictures simulate once more."""
     from srs_opt.discrepancy.answer import answer, corrected_robot
     from srs_opt.discrepancy.report import write_report
+    from srs_opt.files import write_json
     from srs_opt.robot import save_robot
 
     robot = corrected_robot(found)
@@ -110,6 +112,7 @@ def _written(options: argparse.Namespace, found: Discrepancy, maze: Maze | None)
     if options.payoff or maze is not None:
         record["payoff"], words, further = _payoff(options, found, maze)
         summary += words
+    files.append(write_json(options.out / "discrepancy.json", record))
     files.append(write_report(found, record, options.out / "report.html", further))
     return Answer(record, summary, good=found.verdict.word != "not_testable", files=tuple(files))
 

@@ -13,17 +13,31 @@ from srs_opt.discrepancy.pipeline import Discrepancy
 from srs_opt.discrepancy.screen import Score
 from srs_opt.robot import Robot
 
+VERSION = 1
+
 
 def answer(found: Discrepancy, robot_file: Path | None) -> dict[str, Any]:
-    """Return the command's JSON object."""
+    """Return the content of discrepancy.json."""
     speaks = found.believed
     best = found.selection.best if found.selection and speaks else None
     rivals = found.selection.rivals if found.selection and speaks else ()
     return {
+        "version": VERSION,
         "verdict": found.verdict.word,
         "why": found.verdict.why,
-        "effects": _effects(best) if best else [],
         "believed": found.believed,
+        "effects": _effects(best) if best else [],
+        "described": None,
+        "lead": None,
+        "remainder": None,
+        "would_have_seen": None,
+        "noise": {
+            "white_sd_m": found.sd_m,
+            "correlated_sd_m": found.dataset.correlated_sd_m,
+            "correlation_s": found.dataset.correlation_s,
+            "outlier_share": None,
+        },
+        "set_aside": [{"trial": name, "reason": why} for name, why in found.split.left_out],
         "alike": [{"effects": list(p.effects), "angle_rad": round(p.angle_rad, 4)} for p in found.alike],
         "alternatives": [list(h.names) for h in rivals],
         "located": [
@@ -34,6 +48,8 @@ def answer(found: Discrepancy, robot_file: Path | None) -> dict[str, Any]:
         "warnings": _warnings(found),
         "candidates": candidate_rows(found),
         "corrected_robot": str(robot_file) if robot_file else None,
+        "tentative_robot": None,
+        "described_robot": None,
         "seconds": round(found.seconds, 2),
     }
 
@@ -45,7 +61,8 @@ def _effects(best: Hypothesis) -> list[dict[str, Any]]:
         sd = entry_sd(candidate.form, best.fit)
         parameters = {k: v for k, v in spec.items() if k != "name"}
         effect = candidate.form.effect
-        words = {"what": effect.what, "look": effect.look}
+        units = {p.name: p.unit for p in effect.parameters if p.unit}
+        words = {"units": units, "what": effect.what, "look": effect.look}
         found.append({"name": spec["name"], "parameters": parameters, "sd": sd, **words})
     return found
 
@@ -62,6 +79,7 @@ def _gap(found: Discrepancy, speaks: bool) -> dict[str, Any] | None:
         "ratio": gap.ratio if speaks else None,
         "interval": list(gap.interval) if speaks and gap.interval else None,
         "trials": gap.trials,
+        "believed": speaks,
     }
 
 
