@@ -32,7 +32,7 @@ def build_parser() -> Parser:
         "shrink on trials that no fit saw. Writes report.html, discrepancy.json and a robot file.\n"
         "JSON (docs/formats.md): verdict (no_gap, named, named_in_part, described, one_of, unknown,\n"
         "not_testable), believed, effects, described, alternatives, lead, remainder (m, shares of gap,\n"
-        "speed, radius), would_have_seen, gap (m, root mean square per coordinate), noise, set_aside (trials),\n"
+        "speed, radius), would_have_seen, gap (m, root mean square per coordinate), noise, set_aside,\n"
         "next_experiment, located, alike (pairs of effects, angle in rad), candidates, seconds;\n"
         "with --payoff also payoff (m/s, rad/s; null where nothing was named), with --maze payoff.maze\n"
         "(m, s): plans before and after, both driven on the corrected robot.",
