@@ -19,7 +19,6 @@ Those in no list:
 - tank_empties, compressor_ripple: the pressure's share is exp(-per_s t), 1 + ratio sin(2 pi f t);
 - warming_silicone: both time constants times 1 + per_s t;
 - lopsided_chambers: C0 times 1 + ratio to the left, 1 - ratio to the right (in the sign of the command);
-- chamber_stretch: chambers are longer by the share per_curv2 kappa0^2, kappa0 the curvature without load;
 - long_segment: one chamber longer by the share `extra`; payload: a mass on one link;
 - lens_barrel: image times 1 + per_m2 r^2; rolling_shutter: link i is seen (i - 1) delay_s late;
 - with --engine dart only: seized_wheel (a wheel that does not turn: its tyre slides), loose_wheel (one that
@@ -86,6 +85,7 @@ _LISTED = (
     _listed("tether_weight", "load_n", 0.20, False, "tether"),
     _listed("gap_length", "extra_m", 0.008, True, "body"),
     _listed("gap_bending", "ratio", 0.6, True, "body"),
+    _listed("chamber_stretch", "per_curv2", 2e-4, False, "body"),
     _listed("bending_resistance", "ratio", 0.18, False, "bending"),
     _listed("curvature_bias", "bias", 1.2, True, "bending"),
     _listed("segment_bias", "bias segment", 3.0, True, "bending"),
@@ -127,7 +127,6 @@ _UNLISTED = (
     _unlisted("compressor_ripple", "ratio frequency_hz", 0.25, False, "bending", frequency_hz=0.35),
     _unlisted("warming_silicone", "per_s", 0.12, False, "bending"),
     _unlisted("lopsided_chambers", "ratio", 0.08, True, "bending"),
-    _unlisted("chamber_stretch", "per_curv2", 2e-4, False, "body"),
     _unlisted("long_segment", "extra segment", 0.35, True, "body"),
     _unlisted("payload", "extra_kg link", 0.03, False, "body"),
     # the camera

@@ -81,7 +81,7 @@ def _body_points(m: Mechanics, spots: Spots | None) -> Chain:
     """
     if spots is None:
         return m.chain
-    length, gap = m.parameters["segment_length_m"], m.gap_length
+    gap = m.gap_length
     columns = []
     for spot in spots:
         i = spot.carrier
@@ -89,7 +89,7 @@ def _body_points(m: Mechanics, spots: Spots | None) -> Chain:
         if spot.link is not None:
             x, y = x + spot.dx_m * ca.cos(angle), y + spot.dx_m * ca.sin(angle)
         else:
-            for way, kappa in ((gap / 2, m.gap_ratio * m.kappa[i]), (spot.at * length, m.kappa[i])):
+            for way, kappa in ((gap / 2, m.gap_ratio * m.kappa[i]), (spot.at * m.length[i], m.kappa[i])):
                 dx, dy, angle = arc(way, kappa, angle)
                 x, y = x + dx, y + dy
         columns.append((x - spot.dy_m * ca.sin(angle), y + spot.dy_m * ca.cos(angle), angle))

@@ -93,6 +93,13 @@ class Actuator:
         ddkappa = (self.target(valve) - restoring) / (tau1 * tau2) - (1 / tau1 + 1 / tau2) * state.dkappa
         return ActuatorState(state.dkappa, ddkappa, tuple(memory_rates))
 
+    def jerk(self, state: ActuatorState, valve: ca.SX) -> ca.SX:
+        """Return the curvatures' third time derivatives while the valves are held, (N-1, 1)."""
+        free = self.unstack(ca.SX.sym("state", self.states))
+        rates = self.rates(free, valve)
+        third = ca.jtimes(rates.dkappa, free.vector(), rates.vector())
+        return ca.substitute(third, free.vector(), state.vector())
+
     def advance(self, state: ActuatorState, valve: ca.SX, time: ca.SX) -> ActuatorState:
         """Return the state after holding `valve` for `time`: exact where linear, else one RK4 step."""
         if self.linear:

@@ -5,6 +5,9 @@ recursion from the tail gives velocities and accelerations and one from the head
 
     g(Y, Y', Y'') = B^T (f - m r'') + (bending moments) - J theta'' = 0,    B = dr/dY.
 
+Chambers that lengthen do so with the curvature without load, a known function of time: chords then change by
+themselves too (`Growth`), and the curvature is a segment's turn over a length that changes.
+
 Derivatives, for implicit integration, are in `srs_opt.model.chain_derivatives`.
 """
 
@@ -25,12 +28,26 @@ Vector = tuple[ca.SX, ca.SX]
 class Drive:
     """What the actuators and the room do at one instant: no-load curvatures (N-1,), frame (3,) in the room.
 
-    `frame` is (x, y, heading) of the axes in which Y stands.
+    `frame` is (x, y, heading) of the axes in which Y stands. Only chambers that lengthen feel the acceleration.
     """
 
     no_load: ca.SX
     no_load_rate: ca.SX
+    no_load_acceleration: ca.SX
     frame: ca.SX
+
+
+@dataclass(frozen=True)
+class Growth:
+    """What chambers' lengthening adds to rate and acceleration of a chord, and of its derivative by the turn."""
+
+    rate: ca.SX
+    acceleration: ca.SX
+    slope_rate: ca.SX
+    slope_acceleration: ca.SX
+
+
+NO_GROWTH = Growth(*[ca.SX(1, 1)] * 4)
 
 
 @dataclass(frozen=True)
@@ -39,6 +56,7 @@ class Segment:
 
     chord: tuple[ca.SX, ca.SX, ca.SX, ca.SX]
     along: Vector
+    growth: Growth = NO_GROWTH
 
     def room(self, along: ca.SX, across: ca.SX) -> Vector:
         """Return a vector given along and across the chord."""
@@ -63,6 +81,88 @@ class Motion:
     acceleration: Vector
 
 
+@dataclass(frozen=True)
+class Chambers:
+    """The chambers' lengths (N-1, 1) at one instant, their rates and accelerations, and what a turn is per kappa.
+
+    Rates are structural zeros where nothing lengthens.
+    """
+
+    length: ca.SX
+    growth: ca.SX
+    growth_rate: ca.SX
+    turn_per_kappa: ca.SX
+
+    @staticmethod
+    def of(model: CompliantModel, drive: Drive) -> Chambers:
+        """Return them for the model's no-load curvatures at one instant."""
+        free, rate = ca.SX.sym("free", model.links - 1), ca.SX.sym("rate", model.links - 1)
+        acceleration = ca.SX.sym("acceleration", model.links - 1)
+        length = model.chamber_lengths(free)
+        growth = ca.jtimes(length, free, rate)
+        second = ca.jtimes(growth, ca.vertcat(free, rate), ca.vertcat(rate, acceleration))
+        found = ca.substitute(
+            ca.horzcat(length, growth, second),
+            ca.vertcat(free, rate, acceleration),
+            ca.vertcat(drive.no_load, drive.no_load_rate, drive.no_load_acceleration),
+        )
+        length, growth, second = ca.horzsplit(found)
+        return Chambers(length, growth, second, length + model.gap_length * model.gap_ratio)
+
+    def kappa(self, y: ca.SX) -> ca.SX:
+        """Return the curvatures, (N-1, 1)."""
+        return (y[3:] - y[2:-1]) * (1 / self.turn_per_kappa)
+
+    def dkappa(self, y: ca.SX, dy: ca.SX) -> ca.SX:
+        """Return the curvatures' rates."""
+        return (dy[3:] - dy[2:-1] - self.kappa(y) * self.growth) * (1 / self.turn_per_kappa)
+
+    def ddkappa(self, y: ca.SX, dy: ca.SX, ddy: ca.SX) -> ca.SX:
+        """Return the curvatures' accelerations."""
+        turn = ddy[3:] - ddy[2:-1] - 2 * self.growth * self.dkappa(y, dy) - self.growth_rate * self.kappa(y)
+        return turn * (1 / self.turn_per_kappa)
+
+    def of_chord(self, k: int, mixed: list[ca.SX], turn1: ca.SX) -> Growth:
+        """Return what lengthening adds to a chord's rates; `mixed` as `_chord_function` gives it."""
+        c_l, c_ll, c1_l, c1_ll, c2_l = mixed
+        rate, second = self.growth[k], self.growth_rate[k]
+        return Growth(
+            c_l * rate,
+            2 * c1_l * turn1 * rate + c_ll * rate**2 + c_l * second,
+            c1_l * rate,
+            2 * c2_l * turn1 * rate + c1_ll * rate**2 + c1_l * second,
+        )
+
+
+def _chord_function(model: CompliantModel) -> ca.Function:
+    """Return ``(kappa, length, p) -> (chord c, its first three derivatives by the turn, ..., cos, sin)``.
+
+    cos and sin are of half the turn. Where chambers lengthen, derivatives that involve the length l at a
+    fixed turn stand between: c_l, c_ll, c'_l, c'_ll, c''_l.
+    """
+    kappa, length, gap, ratio = ca.SX.sym("kappa"), ca.SX.sym("length"), model.gap_length, model.gap_ratio
+    straight, mixed = ca.SX(ratio).is_zero(), []
+    per_kappa = length + gap * ratio
+    if straight and not model.stretches:
+        jet, cos, sin = straight_gap_chord(kappa, length, gap)
+        jet = tuple(derivative * (1 / per_kappa) ** order for order, derivative in enumerate(jet))
+    else:
+        turn = ca.SX.sym("turn")
+        chord, _, cos, sin = segment_chord(turn / per_kappa, length, gap, ratio)
+        first = ca.jacobian(chord, turn)
+        second = ca.jacobian(first, turn)
+        jet = (chord, first, second, ca.jacobian(second, turn))
+        if model.stretches:
+            c_l, c1_l = ca.jacobian(chord, length), ca.jacobian(first, length)
+            mixed = [c_l, ca.jacobian(c_l, length), c1_l, ca.jacobian(c1_l, length)]
+            mixed.append(ca.jacobian(second, length))
+        found = ca.substitute(ca.vertcat(*jet, *mixed, cos, sin), turn, per_kappa * kappa)
+        *jet, cos, sin = ca.vertsplit(found)
+        jet, mixed = jet[:4], jet[4:]
+    p = model.parameters.vector
+    return ca.Function("chord", [kappa, length, p], [*jet, *mixed, cos, sin], {"cse": True})
+
+
 class BendingChain:
     """Builds expressions of one compliant model; N + 2 coordinates Y (see the module)."""
 
@@ -70,23 +170,11 @@ class BendingChain:
         self.model = model
         self.links = model.links
         self.size = model.links + 2
-        p = model.parameters
-        self.turn_per_kappa = p["segment_length_m"] + model.gap_length * model.gap_ratio
-        kappa = ca.SX.sym("kappa")
-        l, gap = p["segment_length_m"], model.gap_length
-        if ca.SX(model.gap_ratio).is_zero():
-            jet, cos, sin = straight_gap_chord(kappa, l, gap)
-        else:
-            length, slope, cos, sin = segment_chord(kappa, l, gap, model.gap_ratio)
-            second = ca.jacobian(slope, kappa)
-            jet = length, slope, second, ca.jacobian(second, kappa)
-        by_turn = 1 / self.turn_per_kappa
-        jet = tuple(derivative * by_turn**order for order, derivative in enumerate(jet))
-        self._chord = ca.Function("chord", [kappa, p.vector], [*jet, cos, sin], {"cse": True})
+        self._chord = _chord_function(model)
 
-    def kappa(self, y: ca.SX) -> ca.SX:
-        """Return the curvatures (or, of rates of Y, their rates), (N-1, 1)."""
-        return (y[3:] - y[2:-1]) * (1 / self.turn_per_kappa)
+    def chambers(self, drive: Drive) -> Chambers:
+        """Return the chambers' lengths at one instant."""
+        return Chambers.of(self.model, drive)
 
     def residual(self, y: ca.SX, dy: ca.SX, ddy: ca.SX, drive: Drive, h: ca.SX) -> tuple[ca.SX, ca.SX]:
         """Return h g (N+2, 1) and h times the friction power, with `ddy` = h Y''.
@@ -94,7 +182,7 @@ class BendingChain:
         h = 1 gives the inverse dynamics; with the step size the result stays regular where h is zero.
         """
         model, n = self.model, self.links
-        m = self.motion(y, dy, ddy, h)
+        m = self.motion(y, dy, ddy, h, drive)
         f = self.forces(m.place, m.velocity, m.cos, m.sin, drive.frame)
         net_x, net_y = h * f.x - model.mass * m.acceleration[0], h * f.y - model.mass * m.acceleration[1]
         joint = self.joint_forces(net_x, net_y)
@@ -108,46 +196,61 @@ class BendingChain:
             g[k + 1] += turn + stretch + q[k]
         return ca.vertcat(*joint[0], *g), h * f.friction_power
 
-    def moment_rate(self, rate: ca.SX, acceleration: ca.SX) -> ca.SX:
-        """Return dg/dt at fixed Y for no-load curvatures that change at `rate` and `acceleration`."""
-        zero = ca.SX.zeros(self.links - 1, 1)
-        return ca.vertcat(0, 0, self._to_headings(self.model.moment(zero, zero, rate, acceleration)))
+    def rate_in_time(
+        self, y: ca.SX, dy: ca.SX, ddy: ca.SX, drive: Drive, jerk: ca.SX
+    ) -> tuple[ca.SX, ca.SX]:
+        """Return the derivatives of g and the friction power by time at fixed Y, Y', Y''."""
+        rate, acceleration = drive.no_load_rate, drive.no_load_acceleration
+        if not self.model.stretches:
+            zero = ca.SX.zeros(self.links - 1, 1)
+            q = self.model.moment(zero, zero, rate, acceleration) * self._share(self.chambers(drive))
+            return ca.vertcat(0, 0, ca.vertcat(0, q) - ca.vertcat(q, 0)), ca.SX(0)
+        state = [ca.SX.sym(name, self.size) for name in ("y", "dy", "ddy")]
+        free = [ca.SX.sym(name, self.links - 1) for name in ("free", "rate", "acceleration", "jerk")]
+        frame, p = ca.SX.sym("frame", 3), self.model.parameters.vector
+        both = ca.vertcat(*self.residual(*state, Drive(*free[:3], frame), ca.SX(1)))
+        in_time = ca.jtimes(both, ca.vertcat(*free[:3]), ca.vertcat(*free[1:]))
+        function = ca.Function("rate_in_time", [*state, *free, frame, p], [in_time], {"cse": True})
+        found = function(y, dy, ddy, drive.no_load, rate, acceleration, jerk, drive.frame, p)
+        return found[:-1], found[-1]
 
     def _moment(self, y: ca.SX, dy: ca.SX, drive: Drive) -> ca.SX:
         """Return the moments conjugate to the segments' turns."""
-        q = self.model.moment(self.kappa(y), self.kappa(dy), drive.no_load, drive.no_load_rate)
-        return q * self._share()
+        chambers = self.chambers(drive)
+        bend = chambers.kappa(y), chambers.dkappa(y, dy)
+        return self.model.moment(*bend, drive.no_load, drive.no_load_rate) * self._share(chambers)
 
-    def _share(self) -> ca.SX:
-        """Return l kappa over the segment's whole turn: gaps that bend along take part in the turn."""
-        return self.model.parameters["segment_length_m"] / self.turn_per_kappa
+    def _share(self, chambers: Chambers) -> ca.SX:
+        """Return l kappa over the segments' whole turn: gaps that bend along take part in the turn."""
+        return self.model.parameters["segment_length_m"] / chambers.turn_per_kappa
 
-    def turning_stiffness(self) -> ca.SX:
-        """Return the moment conjugate to a segment's turn over that turn, N m."""
-        return self.model.stiffness() * self._share() / self.turn_per_kappa
+    def turning_stiffness(self, drive: Drive) -> tuple[ca.SX, ca.SX]:
+        """Return what a segment's turn and its rate take off the moment conjugate to it, N m and N m s."""
+        chambers, relaxation = self.chambers(drive), self.model.relaxation()
+        stiffness = self.model.stiffness() * self._share(chambers) / chambers.turn_per_kappa
+        # a turn on a chamber that lengthens loses curvature by itself
+        return stiffness * (1 - relaxation * chambers.growth / chambers.turn_per_kappa), stiffness * relaxation
 
-    def _to_headings(self, moment: ca.SX) -> ca.SX:
-        q = moment * self._share()
-        return ca.vertcat(0, q) - ca.vertcat(q, 0)
-
-    def motion(self, y: ca.SX, dy: ca.SX, ddy: ca.SX, h: ca.SX) -> Motion:
+    def motion(self, y: ca.SX, dy: ca.SX, ddy: ca.SX, h: ca.SX, drive: Drive) -> Motion:
         """Return the chain's motion; accelerations, like `ddy`, are h times the true ones."""
-        kappa, p = self.kappa(y), self.model.parameters.vector
+        chambers, p = self.chambers(drive), self.model.parameters.vector
+        kappa = chambers.kappa(y)
         c, s = ca.cos(y[2]), ca.sin(y[2])
         cosines, sines, segments = [c], [s], []
         rows = [[y[0]], [y[1]], [dy[0]], [dy[1]], [ddy[0]], [ddy[1]]]
         for k in range(self.links - 1):
-            *jet, c_half, s_half = self._chord(kappa[k], p)
+            c0, c1, c2, c3, *mixed, c_half, s_half = self._chord(kappa[k], chambers.length[k], p)
             c, s = c * c_half - s * s_half, s * c_half + c * s_half
-            segment = Segment(tuple(jet), (c, s))
-            c0, c1, c2, _ = jet
             turn1, turn2 = (v[3 + k] - v[2 + k] for v in (dy, ddy))
+            growth = chambers.of_chord(k, mixed, turn1) if mixed else NO_GROWTH
+            segment = Segment((c0, c1, c2, c3), (c, s), growth)
             lean1, lean2 = (dy[3 + k] + dy[2 + k]) / 2, (ddy[3 + k] + ddy[2 + k]) / 2
             steps = (
                 *segment.room(c0, ca.SX(0)),
-                *segment.room(c1 * turn1, c0 * lean1),
+                *segment.room(c1 * turn1 + growth.rate, c0 * lean1),
                 *segment.room(
-                    h * (c2 * turn1**2 - c0 * lean1**2) + c1 * turn2, 2 * h * c1 * turn1 * lean1 + c0 * lean2
+                    h * (c2 * turn1**2 - c0 * lean1**2 + growth.acceleration) + c1 * turn2,
+                    2 * h * (c1 * turn1 + growth.rate) * lean1 + c0 * lean2,
                 ),
             )
             for row, step in zip(rows, steps):

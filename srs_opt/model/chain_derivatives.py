@@ -9,12 +9,12 @@ sums over the links from a joint to the head. Hence the form of `ChainMatrix`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 
 from srs_opt.errors import UnsupportedEffectError
-from srs_opt.model.bending_chain import BendingChain, Drive, Motion, Segment
+from srs_opt.model.bending_chain import NO_GROWTH, BendingChain, Drive, Motion, Segment
 from srs_opt.model.chain_matrix import ChainMatrix, Rows
 
 Pair = tuple[ca.SX, ca.SX]  # d(chord)/d(heading behind it, heading ahead of it), (2, 1) each
@@ -66,10 +66,10 @@ class _Loads:
         return self.beyond(move) + self.own[move.link] @ move.ahead
 
 
-def mass_matrix(chain: BendingChain, y: ca.SX) -> ChainMatrix:
+def mass_matrix(chain: BendingChain, y: ca.SX, drive: Drive) -> ChainMatrix:
     """Return -dg/dY'' at Y."""
     still = ca.SX.zeros(chain.size, 1)
-    moves = _moves(chain, chain.motion(y, still, still, ca.SX(0)).segments, still, still)[0]
+    moves = _moves(chain, chain.motion(y, still, still, ca.SX(0), drive).segments, still, still)[0]
     nothing = [ca.SX(2, 2)] * chain.links
     assembly = _Assembly(moves, [_mass(chain), _Loads.of(nothing), _Loads.of(nothing)])
     return assembly.matrix({MASS: (moves, 1.0)}, _inertia(chain))
@@ -83,26 +83,25 @@ def derivatives(chain: BendingChain, y: ca.SX, dy: ca.SX, ddy: ca.SX, drive: Dri
     UnsupportedEffectError
         If an effect makes the force on one link depend on another link's motion.
     """
-    motion = chain.motion(y, dy, ddy, ca.SX(1))
+    motion = chain.motion(y, dy, ddy, ca.SX(1), drive)
     slopes = _force_slopes(chain, motion, y[2:], drive)
     moves, moves1, moves2 = _moves(chain, motion.segments, dy, ddy)
     loads = [_mass(chain), _Loads.of(slopes.by_velocity), _Loads.of(slopes.by_place)]
     assembly = _Assembly(moves, loads)
     mass = chain.model.mass
     net = [slopes.force[0] - mass * motion.acceleration[0], slopes.force[1] - mass * motion.acceleration[1]]
-    spring = _springs(chain)
-    relaxation = chain.model.relaxation()
+    spring, damper = (_springs(chain, stiffness) for stiffness in chain.turning_stiffness(drive))
     turning = _turning_levers(motion.segments, chain.joint_forces(*net))
     power_v = _Loads.of(slopes.power_by_velocity)
     power_r = _Loads.of(slopes.power_by_place)
     return Derivatives(
         mass=assembly.matrix({MASS: (moves, 1.0)}, _inertia(chain)),
         by_rate=assembly.matrix(
-            {MASS: (moves1, -2.0), VELOCITY: (moves, 1.0)}, _Local.of(spring, -relaxation)
+            {MASS: (moves1, -2.0), VELOCITY: (moves, 1.0)}, damper
         ),
         by_place=assembly.matrix(
             {MASS: (moves2, -1.0), VELOCITY: (moves1, 1.0), PLACE: (moves, 1.0)},
-            _Local.of(spring, ca.SX(-1)).plus(turning),
+            spring.plus(turning),
             slopes.by_heading,
         ),
         power_by_rate=ca.horzcat(*[power_v.all(move) for move in moves]),
@@ -118,10 +117,6 @@ class _Local:
     diagonal: list[ca.SX]
     below: list[ca.SX]
     above: list[ca.SX]
-
-    @staticmethod
-    def of(spring: _Local, factor: ca.SX) -> _Local:
-        return _Local(*([factor * v for v in part] for part in (spring.diagonal, spring.below, spring.above)))
 
     def plus(self, other: _Local) -> _Local:
         pairs = (
@@ -199,10 +194,13 @@ def _moves(chain: BendingChain, segments: Sequence[Segment], dy: ca.SX, ddy: ca.
 def lever(segment: Segment, turn1: ca.SX, lean1: ca.SX, turn2: ca.SX, lean2: ca.SX) -> list[Pair]:
     """Return d(chord)/d(heading behind, heading ahead) and its first and second time derivatives."""
     c0, c1, c2, c3 = segment.chord
-    b_n, b_n1, b_n2 = c0 / 2, c1 * turn1 / 2, (c2 * turn1**2 + c1 * turn2) / 2
+    grown = segment.growth
+    b_n, b_n1 = c0 / 2, (c1 * turn1 + grown.rate) / 2
+    b_n2 = (c2 * turn1**2 + c1 * turn2 + grown.acceleration) / 2
     found: list[list[ca.SX]] = [[], [], []]
     for sign in (-1, 1):
-        b_e, b_e1, b_e2 = sign * c1, sign * c2 * turn1, sign * (c3 * turn1**2 + c2 * turn2)
+        b_e, b_e1 = sign * c1, sign * (c2 * turn1 + grown.slope_rate)
+        b_e2 = sign * (c3 * turn1**2 + c2 * turn2 + grown.slope_acceleration)
         # components in axes that turn with lean1
         d_e, d_n = b_e1 - b_n * lean1, b_n1 + b_e * lean1
         dd_e = b_e2 - b_n1 * lean1 - b_n * lean2 - d_n * lean1
@@ -222,12 +220,12 @@ def _inertia(chain: BendingChain) -> _Local:
     return _Local([ca.SX(0), ca.SX(0), *ca.vertsplit(chain.model.inertia)], none, none)
 
 
-def _springs(chain: BendingChain) -> _Local:
-    """Return the stiffness of the segments' turns."""
-    stiffness, n = chain.turning_stiffness(), chain.links
-    diagonal = [ca.SX(0), ca.SX(0), *[(1 if i in (0, n - 1) else 2) * stiffness for i in range(n)]]
-    beside = [ca.SX(0), ca.SX(0), *[-stiffness] * (n - 1)]
-    return _Local(diagonal, beside, beside)
+def _springs(chain: BendingChain, stiffness: ca.SX) -> _Local:
+    """Return the derivatives of moments on the headings of springs (N-1, 1) between neighbours."""
+    none = ca.SX(1, 1)
+    beside = [none, *ca.vertsplit(stiffness), none]
+    diagonal = [none, none, *(-behind - ahead for behind, ahead in zip(beside, beside[1:]))]
+    return _Local(diagonal, [none, *beside[:-1]], [none, *beside[:-1]])
 
 
 def _turning_levers(segments: Sequence[Segment], joint: Sequence[Pair]) -> _Local:
@@ -235,7 +233,7 @@ def _turning_levers(segments: Sequence[Segment], joint: Sequence[Pair]) -> _Loca
     n, half, zero = len(segments) + 1, ca.SX(0.5), ca.SX(0)
     diagonal = [zero] * (n + 2)
     below, above = [zero] * (n + 1), [zero] * (n + 1)
-    for k, segment in enumerate(segments):
+    for k, segment in enumerate(replace(s, growth=NO_GROWTH) for s in segments):
         force = ca.vertcat(*joint[k + 1]).T
         by_behind, by_ahead = (lever(segment, ca.SX(turn), half, zero, zero)[1] for turn in (-1, 1))
         diagonal[2 + k] += force @ by_behind[0]

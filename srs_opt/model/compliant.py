@@ -21,14 +21,17 @@ class CompliantModel(ComplexModel):
 
     Attributes
     ----------
-    no_load, no_load_rate : SX (N-1, 1)
-        Curvature (1/m) that the actuators would give a segment without load, and its rate.
+    no_load_acceleration : SX (N-1, 1)
+        Second time derivative of the curvatures without load (chambers that lengthen feel it).
     """
 
     def __init__(self, parameters: Parameters) -> None:
         super().__init__(parameters)
-        self.no_load = ca.SX.sym("no_load", self.links - 1)
-        self.no_load_rate = ca.SX.sym("no_load_rate", self.links - 1)
+        self.no_load_acceleration = ca.SX.sym("no_load_acceleration", self.links - 1)
+
+    def without_load(self) -> tuple[ca.SX, ca.SX]:
+        """Return the symbols of the no-load curvatures and their rates, which the actuators give."""
+        return ca.SX.sym("no_load", self.links - 1), ca.SX.sym("no_load_rate", self.links - 1)
 
     def stiffness(self) -> ca.SX:
         """Return EI of a segment, N m^2: chamber, gap and effects in series, 1/EI + L_o/(l EI_gap) + ..."""

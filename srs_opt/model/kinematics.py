@@ -114,6 +114,17 @@ def segment_chord(
     return chord, slope, cos, sin
 
 
+def chord_by_length(
+    kappa: ca.SX, segment_length: ca.SX, gap_length: ca.SX, gap_ratio: ca.SX | float
+) -> ca.SX:
+    """Return the derivative of `segment_chord` by the chamber's length at fixed kappa.
+
+    The arc's chord is 2 sin(l kappa/2)/kappa, and half the chamber's turn leans the gaps.
+    """
+    h, bend = segment_length * kappa / 2, gap_length * gap_ratio / 4 * kappa
+    return ca.cos(h) - gap_length * sinc(bend) * kappa / 2 * ca.sin(h + bend)
+
+
 def straight_gap_chord(
     kappa: ca.SX, segment_length: ca.SX, gap_length: ca.SX
 ) -> tuple[tuple[ca.SX, ca.SX, ca.SX, ca.SX], ca.SX, ca.SX]:
@@ -146,6 +157,7 @@ def body_frame_chain(
     gap_length: ca.SX,
     gap_ratio: ca.SX | float = 0.0,
     dkappa: ca.SX | None = None,
+    length_rate: ca.SX | None = None,
 ) -> Shape:
     """Return the chain in the robot's frame: origin at the centre of mass, x along the mean heading.
 
@@ -156,25 +168,31 @@ def body_frame_chain(
     mass : SX (N, 1)
         Link masses, kg (they weigh the centre of mass).
     segment_length, gap_length : SX
-        Chamber l and gap L_o, m.
+        Chamber l (of all, or one each (N-1, 1)) and gap L_o, m.
     gap_ratio : SX
         Curvature of the gaps over that of their chamber (0: straight gaps).
     dkappa : SX (N-1, 1), optional
         Rates of the curvatures, 1/(m s); without, the shape is at rest.
+    length_rate : SX (N-1, 1), optional
+        Rates at which the chambers lengthen, m/s; without, they do not.
     """
     dkappa = ca.SX.zeros(kappa.shape) if dkappa is None else dkappa
-    turn_per_kappa = segment_length + gap_length * gap_ratio
+    length = segment_length * ca.SX.ones(kappa.shape)
+    growth = ca.SX(*kappa.shape) if length_rate is None else length_rate
+    turn_per_kappa = length + gap_length * gap_ratio
     angle = _headings(turn_per_kappa * kappa)
-    angle_rate = _headings(turn_per_kappa * dkappa)
+    angle_rate = _headings(turn_per_kappa * dkappa + growth * kappa)
     c, s = ca.cos(angle[0]), ca.sin(angle[0])
     x, y, x_rate, y_rate = ([ca.SX(0)] for _ in range(4))
     cosines, sines = [c], [s]
     for i in range(kappa.shape[0]):
-        chord, slope, c_half, s_half = segment_chord(kappa[i], segment_length, gap_length, gap_ratio)
+        chord, slope, c_half, s_half = segment_chord(kappa[i], length[i], gap_length, gap_ratio)
         # two half turns by complex products: no further cosine along the chain
         c, s = c * c_half - s * s_half, s * c_half + c * s_half
         middle_rate = (angle_rate[i] + angle_rate[i + 1]) / 2
         along, across = slope * dkappa[i], chord * middle_rate
+        if not growth[i].is_zero():
+            along += growth[i] * chord_by_length(kappa[i], length[i], gap_length, gap_ratio)
         x.append(x[-1] + chord * c)
         y.append(y[-1] + chord * s)
         x_rate.append(x_rate[-1] + along * c - across * s)

@@ -40,13 +40,26 @@ class Forces:
 
 
 class Mechanics(ABC):
-    """Kinematics, inertia and forces of one structure; a model adds its yaw equation."""
+    """Kinematics, inertia and forces of one structure; a model adds its yaw equation.
+
+    Attributes
+    ----------
+    kappa, dkappa : SX (N-1, 1)
+        Curvatures (1/m) and their rates.
+    no_load, no_load_rate : SX (N-1, 1)
+        Curvatures that the actuators would give without load: the same unless segments bend under load.
+    length : SX (N-1, 1)
+        The chambers' lengths, m.
+    shape : SX
+        The symbols that the places of all points of the body depend on.
+    """
 
     def __init__(self, parameters: Parameters) -> None:
         p = self.parameters = parameters
         self.links = n = parameters.structure.links
         self.kappa = ca.SX.sym("kappa", n - 1)
         self.dkappa = ca.SX.sym("dkappa", n - 1)
+        self.no_load, self.no_load_rate = self.without_load()
         gap, ratio = p["gap_length_m"], ca.SX(0)
         self.mass = p["link_mass_kg"] * ca.SX.ones(n, 1)
         self.inertia = p["link_inertia_kg_m2"] * ca.SX.ones(n, 1)
@@ -55,8 +68,28 @@ class Mechanics(ABC):
             ratio = ratio + effect.gap_ratio(e) if effect.gap_ratio else ratio
             self.mass = self.mass + effect.extra_mass(e, n) if effect.extra_mass else self.mass
         self.gap_length, self.gap_ratio = gap, ratio
-        self.chain = body_frame_chain(self.kappa, self.mass, p["segment_length_m"], gap, ratio, self.dkappa)
+        self.length = self.chamber_lengths(self.no_load)
+        growth = ca.jtimes(self.length, self.no_load, self.no_load_rate)
+        apart = self.stretches and not ca.is_equal(self.no_load, self.kappa)
+        self.shape = ca.vertcat(self.kappa, self.no_load) if apart else self.kappa
+        self.chain = body_frame_chain(self.kappa, self.mass, self.length, gap, ratio, self.dkappa, growth)
         self.chain_rate = self.chain.rates
+
+    def without_load(self) -> tuple[ca.SX, ca.SX]:
+        """Return the curvatures without load and their rates, (N-1, 1) each."""
+        return self.kappa, self.dkappa
+
+    @property
+    def stretches(self) -> bool:
+        """Whether chambers lengthen as they are pressed."""
+        return any(effect.stretch for effect, _ in self.parameters.effects)
+
+    def chamber_lengths(self, no_load: ca.SX) -> ca.SX:
+        """Return the chambers' lengths (N-1, 1), m, at curvatures without load."""
+        longer = ca.SX.ones(self.links - 1, 1)
+        for effect, e in self.parameters.effects:
+            longer = longer + effect.stretch(e, no_load) if effect.stretch else longer
+        return self.parameters["segment_length_m"] * longer
 
     @abstractmethod
     def yaw_inertia(self) -> ca.SX:

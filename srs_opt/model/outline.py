@@ -26,7 +26,7 @@ def centre_line_function(structure: Structure, samples: int) -> ca.Function:
     xs, ys = [x], [y]
     for i in range(structure.segments):
         half_gap, bend = mechanics.gap_length / 2, mechanics.gap_ratio * kappa[i]
-        part = p["segment_length_m"] / POINTS_PER_ARC
+        part = mechanics.length[i] / POINTS_PER_ARC
         for length, curvature in [(half_gap, bend), *[(part, kappa[i])] * POINTS_PER_ARC, (half_gap, bend)]:
             dx, dy, heading = arc(length, curvature, heading)
             x, y = x + dx, y + dy

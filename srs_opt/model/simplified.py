@@ -18,7 +18,7 @@ class SimplifiedModel(Mechanics):
 
     def _link_inertia(self) -> ca.SX:
         """Return j(i) of (4), (N, 1): a third of m l^2 for every arc that ends at the link."""
-        arms2 = chord_length(self.kappa, self.parameters["segment_length_m"]) ** 2
+        arms2 = chord_length(self.kappa, self.length) ** 2
         zero = ca.SX(0)
         return self.mass / 3 * (ca.vertcat(zero, arms2) + ca.vertcat(arms2, zero))
 

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from srs_opt.model.actuator import Actuator, ActuatorState
-from srs_opt.model.bending_chain import BendingChain, Drive
+from srs_opt.model.bending_chain import BendingChain, Chambers, Drive
 from srs_opt.model.chain_derivatives import derivatives, mass_matrix
 from srs_opt.model.compliant import CompliantModel
 from srs_opt.model.parameters import Structure
@@ -55,19 +55,19 @@ def compliant_step(structure: Structure) -> ca.Function:
     act = actuator.unstack(x[layout.actuator])
     chain = BendingChain(model)
     to_tail, to_body = _conversions(model)
-    y, dy = to_tail(x[VELOCITY], x[layout.kappa], x[layout.dkappa], p)
+    y, dy = to_tail(x[VELOCITY], x[layout.kappa], x[layout.dkappa], act.kappa, act.dkappa, p)
     increments, error, end = _stages(chain, y, dy, x[POSE], actuator, act, valve, h)
     n = chain.size
     total = sum((i.vector() for i in increments[1:]), increments[0].vector())
     y, dy = y + total[:n], dy + total[n : 2 * n]
-    moved, velocity, kappa, dkappa = to_body(y, dy, p)
-    c, s = ca.cos(x[2]), ca.sin(x[2])
-    pose = ca.vertcat(x[0] + c * moved[0] - s * moved[1], x[1] + s * moved[0] + c * moved[1], x[2] + moved[2])
     shape_error = ca.SX(0)
     if not actuator.linear:
         half = actuator.advance(actuator.advance(act, valve, h / 2), valve, h / 2)
         bend = parameters["segment_length_m"] * (half.dkappa - end.dkappa)
         shape_error, end = ca.sumsqr(LEVER_M * bend), half
+    moved, velocity, kappa, dkappa = to_body(y, dy, end.kappa, end.dkappa, p)
+    c, s = ca.cos(x[2]), ca.sin(x[2])
+    pose = ca.vertcat(x[0] + c * moved[0] - s * moved[1], x[1] + s * moved[0] + c * moved[1], x[2] + moved[2])
     following = ca.vertcat(pose, velocity, x[WORK] + total[-1], kappa, dkappa, end.vector())
     assert following.shape[0] == layout.size >= BODY_STATES
     return ca.Function(
@@ -95,15 +95,14 @@ def _stages(
     shapes = {c: actuator.advance(act, valve, c * h) if c else act for c in sorted(set(NODES))}
 
     def drive(at: ActuatorState) -> Drive:
-        return Drive(at.kappa, at.dkappa, pose)
+        return Drive(at.kappa, at.dkappa, actuator.rates(at, valve).dkappa, pose)
 
     start = drive(act)
-    rates = actuator.rates(act, valve)
     force, power = chain.residual(y, dy, zero, start, ca.SX(1))
-    acceleration = mass_matrix(chain, y).solver()(force)
+    acceleration = mass_matrix(chain, y, start).solver()(force)
     slopes = derivatives(chain, y, dy, acceleration, start)
+    in_time, power_in_time = chain.rate_in_time(y, dy, acceleration, start, actuator.jerk(act, valve))
     acceleration = h * acceleration
-    in_time = chain.moment_rate(rates.kappa, rates.dkappa)
     step = h * GAMMA
     solve = slopes.mass.plus(slopes.by_rate, -step).plus(slopes.by_place, -(step**2)).solver()
     k: list[_Increment] = []
@@ -125,6 +124,7 @@ def _stages(
         velocity = solve(GAMMA * right)
         place = GAMMA * (r_place + h * velocity)
         work = power + coupled.work + h * (slopes.power_by_rate @ velocity + slopes.power_by_place @ place)
+        work += h * h * TIME_WEIGHTS[i] * power_in_time
         k.append(_Increment(place, velocity, velocity / GAMMA - r_velocity, GAMMA * work))
     error = k[5].velocity
     squared = error.T @ slopes.mass.times(error) / chain.model.total_mass()
@@ -149,24 +149,25 @@ def _scaled(weight: float, i: _Increment) -> _Increment:
 
 
 def _conversions(model: CompliantModel) -> tuple[ca.Function, ca.Function]:
-    """Return (velocity, kappa, dkappa, p) -> (Y, Y') and (Y, Y', p) -> (moved, velocity, kappa, dkappa).
+    """Return (velocity, kappa, dkappa, free, p) -> (Y, Y') and (Y, Y', free, p) -> (moved, velocity, kappa, dkappa).
 
-    Y stands in the robot's frame at the step's start; `moved` is the pose (3,) in that frame.
+    `free` are the no-load curvatures and their rates. Y stands in the robot's frame at the step's start;
+    `moved` is the pose (3,) in that frame.
     """
-    p = model.parameters.vector
+    p, free = model.parameters.vector, [model.no_load, model.no_load_rate]
     kappa, dkappa, velocity = model.kappa, model.dkappa, ca.SX.sym("velocity", 3)
     c, d, yaw_rate = model.chain, model.chain_rate, model.yaw_rate(velocity[2])
     v = model.link_velocities(velocity[0], velocity[1], yaw_rate)
     to_tail = ca.Function(
         "to_tail",
-        [velocity, kappa, dkappa, p],
+        [velocity, kappa, dkappa, *free, p],
         [ca.vertcat(c.x[0], c.y[0], c.angle), ca.vertcat(v.x[0], v.y[0], v.angle)],
         {"cse": True},
     )
     w = ca.SX.sym("w")
     body = ca.Function(
         "body",
-        [kappa, dkappa, w, p],
+        [kappa, dkappa, w, *free, p],
         [
             ca.vertcat(c.x[0], c.y[0]),
             ca.vertcat(d.x[0] - w * c.y[0], d.y[0] + w * c.x[0]),
@@ -176,10 +177,10 @@ def _conversions(model: CompliantModel) -> tuple[ca.Function, ca.Function]:
     )
     n = model.links
     y, dy = ca.SX.sym("y", n + 2), ca.SX.sym("dy", n + 2)
-    chain = BendingChain(model)
-    bend, rate = chain.kappa(y), chain.kappa(dy)
+    chambers = Chambers.of(model, Drive(*free, model.no_load_acceleration, ca.SX.zeros(3, 1)))
+    bend, rate = chambers.kappa(y), chambers.dkappa(y, dy)
     turn, spin = ca.sum1(y[2:]) / n, ca.sum1(dy[2:]) / n
-    tail, tail_rate, momentum = body(bend, rate, spin, p)
+    tail, tail_rate, momentum = body(bend, rate, spin, *free, p)
     cos, sin = ca.cos(turn), ca.sin(turn)
     moved = ca.vertcat(
         y[0] - cos * tail[0] + sin * tail[1],
@@ -191,5 +192,5 @@ def _conversions(model: CompliantModel) -> tuple[ca.Function, ca.Function]:
         cos * dy[1] - sin * dy[0] - tail_rate[1],
         momentum,
     )
-    to_body = ca.Function("to_body", [y, dy, p], [moved, speed, bend, rate], {"cse": True})
+    to_body = ca.Function("to_body", [y, dy, *free, p], [moved, speed, bend, rate], {"cse": True})
     return to_tail, to_body

@@ -10,7 +10,7 @@ from srs_opt.model.compliant import CompliantModel
 
 
 def bend_acceleration(model: CompliantModel, velocity: ca.SX, heading: ca.SX) -> ca.SX:
-    """Return kappa'' (N-1, 1) from the model's own kappa, kappa', no-load curvature and its rate.
+    """Return kappa'' (N-1, 1) from the model's own kappa, kappa', no-load curvature and its derivatives.
 
     Parameters
     ----------
@@ -24,6 +24,7 @@ def bend_acceleration(model: CompliantModel, velocity: ca.SX, heading: ca.SX) ->
     place, rate = model.chain, model.link_velocities(velocity[0], velocity[1], yaw_rate)
     y = ca.vertcat(place.x[0], place.y[0], place.angle)
     dy = ca.vertcat(rate.x[0], rate.y[0], rate.angle)
-    drive = Drive(model.no_load, model.no_load_rate, ca.vertcat(0, 0, heading))
+    free = model.no_load, model.no_load_rate, model.no_load_acceleration
+    drive = Drive(*free, ca.vertcat(0, 0, heading))
     force, _ = chain.residual(y, dy, ca.SX.zeros(chain.size, 1), drive, ca.SX(1))
-    return chain.kappa(mass_matrix(chain, y).solver()(force))
+    return chain.chambers(drive).ddkappa(y, dy, mass_matrix(chain, y, drive).solver()(force))

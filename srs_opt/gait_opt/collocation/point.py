@@ -174,34 +174,35 @@ def _linear_curvature(kind: PointKind, s: _Symbols) -> tuple[ca.SX, ca.SX, ca.SX
 
 def _shape(
     kind: PointKind, actuator: Actuator, s: _Symbols, closed: ca.SX, deviation: ca.SX
-) -> tuple[ca.SX, ca.SX, ca.SX]:
-    """Return curvatures, their rates, and the rates of the actuators' deviation from the closed form.
+) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
+    """Return curvatures, rates, accelerations, and the rates of the actuators' deviation from the closed form.
 
     `closed` stacks what `_linear_curvature` returns. Relaxed, the actuators' states are
     collocated themselves.
     """
     if kind.relaxed:
         own = actuator.unstack(deviation)
-        return own.kappa, own.dkappa, actuator.rates(own, s.switches).vector()
+        rates = actuator.rates(own, s.switches)
+        return own.kappa, own.dkappa, rates.dkappa, rates.vector()
     kappa, dkappa, valve = ca.vertsplit(closed, kind.segments)
+    tau1, tau2 = time_constants(actuator.parameters)
+    linear = (actuator.target(valve) - kappa) / (tau1 * tau2) - (1 / tau1 + 1 / tau2) * dkappa
     if actuator.linear:
-        return kappa, dkappa, ca.SX(0, 1)
+        return kappa, dkappa, linear, ca.SX(0, 1)
     away = actuator.unstack(deviation)
     state = ActuatorState(kappa + away.kappa, dkappa + away.dkappa, away.memory)
     full = actuator.rates(state, valve)
-    tau1, tau2 = time_constants(actuator.parameters)
-    linear = (actuator.target(valve) - kappa) / (tau1 * tau2) - (1 / tau1 + 1 / tau2) * dkappa
     rates = ca.vertcat(away.dkappa, full.dkappa - linear, *full.memory)
-    return state.kappa, state.dkappa, rates
+    return state.kappa, state.dkappa, full.dkappa, rates
 
 
 def _lateral_reach(m: Mechanics, heading: ca.SX, ahead: ca.SX, aside: ca.SX, bend: ca.SX) -> ca.SX:
     """Return how far links and arc middles lie left of the mean path (curvature `bend`), (2 N - 1, 1) m."""
-    chain, length = m.chain, m.parameters["segment_length_m"]
+    chain, length = m.chain, m.length
     xs, ys = [chain.x], [chain.y]
     for i in range(m.links - 1):
         chord = ca.vertcat(chain.x[i + 1] - chain.x[i], chain.y[i + 1] - chain.y[i])
-        sagitta = m.kappa[i] * length**2 / 8
+        sagitta = m.kappa[i] * length[i] ** 2 / 8
         norm = ca.sqrt(ca.dot(chord, chord))
         xs.append((chain.x[i] + chain.x[i + 1]) / 2 + sagitta * chord[1] / norm)
         ys.append((chain.y[i] + chain.y[i + 1]) / 2 - sagitta * chord[0] / norm)
@@ -225,7 +226,7 @@ def _equations(kind: PointKind, s: _Symbols, p: ca.SX, closed: ca.SX) -> ca.SX:
     _, m, actuator = build(kind.structure)
     x = s.scale * s.x
     velocity, heading, ahead, aside = x[:3], x[3], x[4], x[5]
-    free, free_rate, deviation_rate = _shape(kind, actuator, s, closed, x[kind.moving :])
+    free, free_rate, free_acceleration, deviation_rate = _shape(kind, actuator, s, closed, x[kind.moving :])
     body_rate, power = m.velocity_rate(ca.SX.zeros(3, 1), velocity)
     yaw_rate = m.yaw_rate(velocity[2])
     c, sn = ca.cos(heading), ca.sin(heading)
@@ -234,7 +235,8 @@ def _equations(kind: PointKind, s: _Symbols, p: ca.SX, closed: ca.SX) -> ca.SX:
     if isinstance(m, CompliantModel):
         kappa, dkappa = ca.vertsplit(x[BODY : kind.moving], kind.segments)
         bend_rates = ca.vertcat(dkappa, bend_acceleration(m, velocity, heading))
-        given = [(m.no_load_rate, free_rate), (m.no_load, free), (m.dkappa, dkappa), (m.kappa, kappa)]
+        given = [(m.no_load_acceleration, free_acceleration), (m.no_load_rate, free_rate), (m.no_load, free)]
+        given += [(m.dkappa, dkappa), (m.kappa, kappa)]
     rates = ca.vertcat(
         body_rate,
         yaw_rate - s.turn_rate,

@@ -57,6 +57,7 @@ class Effect:
     through_tether : bool
         Whether trials without a tether are free of it (default: those of kind tether).
     gap_extra, gap_ratio : hooks of the geometry; added to the gap (m) and to the gaps' bending ratio.
+    stretch : hook (e, curvature without load); the share by which the chambers are longer.
     extra_mass, extra_load : hooks; added to link masses (kg, with weight) and to normal forces (N).
     wheel_angle : hook; added to the wheels' angle against their link (rad).
     rolling_factor, skidding_factor : hooks (e, speed); multiply the Coulomb term along, across.
@@ -83,6 +84,7 @@ class Effect:
     through_tether: bool | None = None
     gap_extra: Callable[[Symbols], ca.SX] | None = None
     gap_ratio: Callable[[Symbols], ca.SX] | None = None
+    stretch: Callable[[Symbols, ca.SX], ca.SX] | None = None
     extra_mass: Callable[[Symbols, int], ca.SX] | None = None
     extra_load: Callable[[Symbols, int], ca.SX] | None = None
     wheel_angle: Callable[[Symbols, int], ca.SX] | None = None
