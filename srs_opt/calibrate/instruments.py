@@ -90,7 +90,7 @@ def _instrument_readings(structure: Structure) -> ca.Function:
     assert isinstance(m, CompliantModel)
     optics = [across(0, 0, camera), across(1, 0, camera)]
     readings = [weight[0], weight[-1], *optics, -clock, ca.asin(steep), 1 / m.stiffness()]
-    straight = [ca.substitute(ca.SX(r), m.kappa, ca.SX.zeros(m.kappa.shape)) for r in readings]
+    straight = [ca.substitute(ca.SX(r), m.shape, ca.SX.zeros(m.shape.shape)) for r in readings]
     return ca.Function("readings", [parameters.vector, camera, clock], [ca.vertcat(*straight)])
 
 
@@ -137,8 +137,8 @@ def _tow_force(structure: Structure) -> ca.Function:
     parameters, m, _ = build(structure)
     speed = ca.SX.sym("speed")
     forces = m.forces(ca.SX.zeros(3, 1), speed, ca.SX(0), ca.SX(0))
-    zero = ca.SX.zeros(m.kappa.shape)
-    total = ca.substitute(-ca.sum1(forces.x), ca.vertcat(m.kappa, m.dkappa), ca.vertcat(zero, zero))
+    shape = ca.vertcat(m.shape, m.shape_rate)
+    total = ca.substitute(-ca.sum1(forces.x), shape, ca.SX.zeros(shape.shape))
     return ca.Function("tow", [speed, parameters.vector], [total])
 
 

@@ -42,7 +42,8 @@ class Nodes:
     time_s : array (n + 1,)
     body : array (n + 1, 6)
         Pose, then velocity in the robot's frame and yaw momentum.
-    kappa, dkappa : array (n + 1, N-1)
+    kappa, dkappa, no_load, no_load_rate : array (n + 1, N-1)
+        Of the body, and those that the actuators would give without load.
     start : array (nx,)
         The whole state at the first node.
     valve : array (n, N-1)
@@ -57,11 +58,21 @@ class Nodes:
     body: np.ndarray
     kappa: np.ndarray
     dkappa: np.ndarray
+    no_load: np.ndarray
+    no_load_rate: np.ndarray
     start: np.ndarray
     valve: np.ndarray
     p: np.ndarray
     camera: np.ndarray
     clock_s: float
+
+    def shape(self, layout: StateLayout) -> np.ndarray:
+        """Return the body's shape (n + 1, ...) as `layout` has it."""
+        return np.concatenate([self.kappa, self.no_load], axis=1)[:, : len(layout.shape)]
+
+    def shape_rate(self, layout: StateLayout) -> np.ndarray:
+        """Return the rates of the body's shape (n + 1, ...)."""
+        return np.concatenate([self.dkappa, self.no_load_rate], axis=1)[:, : len(layout.shape)]
 
 
 def tolerance_for(values: int, sd_m: float) -> float:
@@ -234,11 +245,14 @@ def _cycles(timeline: Timeline, period_s: float) -> list[Timeline]:
 def _nodes(
     layout: StateLayout, states: np.ndarray, valve: np.ndarray, h_s: np.ndarray, packed: Packed
 ) -> Nodes:
+    free = states[layout.actuator]
     return Nodes(
         time_s=np.concatenate([[0.0], np.cumsum(h_s)]),
         body=states[:6].T,
         kappa=states[layout.kappa].T,
         dkappa=states[layout.dkappa].T,
+        no_load=free[: layout.segments].T,
+        no_load_rate=free[layout.segments : 2 * layout.segments].T,
         start=states[:, 0],
         valve=valve.T,
         p=packed.p,

@@ -19,7 +19,8 @@ from srs_opt.measurement.spots import Spots
 from srs_opt.model.kinematics import Chain, arc
 from srs_opt.model.mechanics import Mechanics
 from srs_opt.model.parameters import Structure, effect_symbols
-from srs_opt.model.registry import build
+from srs_opt.model.registry import build, state_layout
+from srs_opt.model.state import StateLayout
 from srs_opt.simulate.compiled import compiled
 
 # of a typical flexibility: as stiff as that a body moves by 0.1 % other than to first order
@@ -51,7 +52,7 @@ class Prediction:
 
 @lru_cache(maxsize=8)
 def _picture(structure: Structure, centre_only: bool, spots: Spots | None) -> ca.Function:
-    """Return ``(pose, kappa, camera, p) -> (points, by pose, by kappa, by camera, by p)``, mapped."""
+    """Return ``(pose, shape, camera, p) -> (points, by pose, by shape, by camera, by p)``, mapped."""
 
     def make() -> ca.Function:
         parameters, m, _ = build(structure)
@@ -65,9 +66,9 @@ def _picture(structure: Structure, centre_only: bool, spots: Spots | None) -> ca
         x, y = _seen(x, y, pose[2] + body.angle, values, m.mass if centre_only else None)
         points = ca.vec(ca.horzcat(x, y).T)
         p = parameters.vector
-        by = [ca.densify(ca.jacobian(points, v)) for v in (pose, m.kappa, camera, p)]
+        by = [ca.densify(ca.jacobian(points, v)) for v in (pose, m.shape, camera, p)]
         outputs = [points, *(ca.reshape(o, -1, 1) for o in by)]
-        single = ca.Function("picture", [pose, m.kappa, camera, p], outputs, {"cse": True})
+        single = ca.Function("picture", [pose, m.shape, camera, p], outputs, {"cse": True})
         return mapped(single, (2, 3))
 
     seen = " ".join(e.name for e in camera_effects())
@@ -148,11 +149,13 @@ def predict(
     at = trial.time_s + nodes.clock_s
     rate = _pose_rate(model, nodes, values)
     pose = _hermite(nodes.time_s, nodes.body[:, :3], rate, at)
-    kappa = _hermite(nodes.time_s, nodes.kappa, nodes.dkappa, at)
     structure, kept = model.structure(values, coordinates)
+    layout = state_layout(structure)
+    shape = _hermite(nodes.time_s, nodes.shape(layout), nodes.shape_rate(layout), at)
+    kappa = shape[:, : model.segments]
     function = _picture(structure, centre_only, None if centre_only else trial.spots)
-    points, by_pose, by_kappa, by_camera, by_p = evaluate(
-        function, (pose, kappa), nodes.camera, nodes.p[kept]
+    points, by_pose, by_shape, by_camera, by_p = evaluate(
+        function, (pose, shape), nodes.camera, nodes.p[kept]
     )
     frames, seen = points.shape
     slopes = np.zeros((frames, seen, len(coordinates)))
@@ -163,23 +166,29 @@ def predict(
     softening = np.array([model.softens(c, values) for c in coordinates])
     moving = np.flatnonzero(np.any(seeds != 0, axis=0) & ~softening)
     jac_pose = by_pose.reshape(frames, 3, seen).transpose(0, 2, 1)
-    jac_kappa = by_kappa.reshape(frames, -1, seen).transpose(0, 2, 1)
+    jac_shape = by_shape.reshape(frames, -1, seen).transpose(0, 2, 1)
     if moving.size:
         typical = np.array([coordinates[int(k)].typical for k in moving])
         varied = variation(structure, nodes, nodes.p[kept], seeds[:, moving], typical, trial.heading_rad)
         part = jac_pose @ _linear(nodes.time_s, varied.pose, at)
-        part += jac_kappa @ _linear(nodes.time_s, varied.kappa, at)
+        part += jac_shape @ _linear(nodes.time_s, varied.shape, at)
         jac_p = by_p.reshape(frames, -1, seen).transpose(0, 2, 1)
         touched = np.any(seeds != 0, axis=1) & np.any(by_p.reshape(frames, -1, seen) != 0, axis=(0, 2))
         part += jac_p[:, :, touched] @ seeds[touched][:, moving]
         slopes[:, :, moving] = part
     for k in np.flatnonzero(softening):
-        began = _onset(model, trial, nodes, values, coordinates[int(k)])
+        began, soft, p = _onset(model, trial, nodes, values, coordinates[int(k)])
+        by_bend = jac_shape
+        if (bent := state_layout(soft)).stretches:  # lengths follow the pressure, not the bend
+            loaded = _hermite(nodes.time_s, nodes.shape(bent), nodes.shape_rate(bent), at)
+            picture = _picture(soft, centre_only, None if centre_only else trial.spots)
+            by_bend = evaluate(picture, (pose, loaded), nodes.camera, p)[2]
+            by_bend = by_bend.reshape(frames, -1, seen).transpose(0, 2, 1)
         slopes[:, :, k] = (jac_pose @ _linear(nodes.time_s, began.pose, at))[..., 0]
-        slopes[:, :, k] += (jac_kappa @ _linear(nodes.time_s, began.kappa, at))[..., 0]
+        slopes[:, :, k] += (by_bend @ _linear(nodes.time_s, began.shape, at))[..., 0]
     jac_camera = by_camera.reshape(frames, -1, seen).transpose(0, 2, 1)
-    velocity = _velocity(nodes, rate, at)
-    in_time = jac_pose @ velocity[0][..., None] + jac_kappa @ velocity[1][..., None]
+    velocity = _velocity(nodes, layout, rate, at)
+    in_time = jac_pose @ velocity[0][..., None] + jac_shape @ velocity[1][..., None]
     later = (by.clock_s - by.delay_s)[0]  # a delay of the valves shifts the motion in time
     slopes[:, :, later != 0] += in_time * later[later != 0]
     shown = np.any(by.camera != 0, axis=0)
@@ -187,12 +196,14 @@ def predict(
     return Prediction(points, slopes, pose, kappa)
 
 
-def _onset(model: Model, trial: Trial, nodes: Nodes, values: Values, c: Coordinate) -> Variation:
-    """Return the sensitivities to a body's beginning to bend."""
+def _onset(
+    model: Model, trial: Trial, nodes: Nodes, values: Values, c: Coordinate
+) -> tuple[Variation, Structure, np.ndarray]:
+    """Return the sensitivities to a body's beginning to bend, the bending body and its parameters."""
     ends = [{**values, c.name: share * ONSET * c.typical} for share in (0.5, 1.0)]
     structure, kept = model.structure(ends[0])
     flexible = tuple(model.pack(end, conditions_of(trial)).p[kept] for end in ends)
-    return onset(structure, nodes, flexible, 0.5 * ONSET * c.typical)
+    return onset(structure, nodes, flexible, 0.5 * ONSET * c.typical), structure, flexible[0]
 
 
 @lru_cache(maxsize=8)
@@ -201,8 +212,8 @@ def _pose_rate_function(structure: Structure) -> ca.Function:
         parameters, m, _ = build(structure)
         body = ca.SX.sym("body", 6)
         rate = m.pose_rate(body[:3], body[3:])
-        single = ca.Function("rate", [body, m.kappa, m.dkappa, parameters.vector], [rate], {"cse": True})
-        return mapped(single, (3,))
+        inputs = [body, m.shape, m.shape_rate, parameters.vector]
+        return mapped(ca.Function("rate", inputs, [rate], {"cse": True}), (3,))
 
     return compiled(f"pose rate {structure}", make)
 
@@ -210,13 +221,16 @@ def _pose_rate_function(structure: Structure) -> ca.Function:
 def _pose_rate(model: Model, nodes: Nodes, values: Values) -> np.ndarray:
     structure, kept = model.structure(values)
     function = _pose_rate_function(structure)
-    return evaluate(function, (nodes.body, nodes.kappa, nodes.dkappa), nodes.p[kept])[0]
+    layout = state_layout(structure)
+    return evaluate(function, (nodes.body, nodes.shape(layout), nodes.shape_rate(layout)), nodes.p[kept])[0]
 
 
-def _velocity(nodes: Nodes, rate: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the rates of pose and curvature at the frames; none before the start."""
+def _velocity(
+    nodes: Nodes, layout: StateLayout, rate: np.ndarray, at: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the rates of pose and shape at the frames; none before the start."""
     moving = (at >= 0)[:, None]
     return (
         np.asarray(_linear(nodes.time_s, rate, at) * moving),
-        np.asarray(_linear(nodes.time_s, nodes.dkappa, at) * moving),
+        np.asarray(_linear(nodes.time_s, nodes.shape_rate(layout), at) * moving),
     )

@@ -17,6 +17,7 @@ from srs_opt.calibrate.nominal import Nodes
 from srs_opt.calibrate.start import start_pose
 from srs_opt.model.parameters import Structure
 from srs_opt.model.registry import state_layout
+from srs_opt.model.state import StateLayout
 from srs_opt.simulate.integrate import step_kernel
 from srs_opt.simulate.kernel import LANES, Course, Kernel
 from srs_opt.simulate.rosenbrock import BODY_STATES
@@ -33,11 +34,12 @@ class Variation:
     Attributes
     ----------
     pose : array (nodes, 3, K)
-    kappa : array (nodes, N-1, K)
+    shape : array (nodes, N-1 or more, K)
+        As `StateLayout.shape`.
     """
 
     pose: np.ndarray
-    kappa: np.ndarray
+    shape: np.ndarray
 
 
 def variation(
@@ -54,7 +56,7 @@ def variation(
     with which the nodes were simulated, as long as the effects that tell them apart are absent; `typical`
     (K,) are the coordinates' typical sizes.
     """
-    n, hair = structure.segments, HAIR * typical
+    layout, hair = state_layout(structure), HAIR * typical
     start, h = _start(structure, nodes), np.diff(nodes.time_s)
     same = start.size == nodes.start.size
 
@@ -69,9 +71,9 @@ def variation(
     # another structure integrates the actuators otherwise: what it makes of the nodes' motion comes first
     if not same:
         courses.insert(0, course(start, p))
-    moved = _motions(step_kernel(structure), courses, n)
+    moved = _motions(step_kernel(structure), courses, layout)
     if same:
-        unmoved = np.concatenate([nodes.body[:, :3], nodes.kappa], axis=1)[..., None]
+        unmoved = np.concatenate([nodes.body[:, :3], nodes.shape(layout)], axis=1)[..., None]
     else:
         unmoved, moved = moved[..., :1], moved[..., 1:]
     slopes = (moved - unmoved) / hair
@@ -106,14 +108,14 @@ def onset(
     rigid = replace(layout, compliant=False, actuator_states=nodes.start.size - BODY_STATES)
     start, h = layout.adopt(nodes.start, rigid), np.diff(nodes.time_s)
     courses = [Course(start, h, nodes.valve, p) for p in flexible]
-    moved = _motions(step_kernel(structure), courses, structure.segments)
+    moved = _motions(step_kernel(structure), courses, layout)
     slopes = (moved[..., 1:] - moved[..., :1]) / difference
     return Variation(slopes[:, :3], slopes[:, 3:])
 
 
-def _motions(kernel: Kernel, courses: Sequence[Course], segments: int) -> np.ndarray:
-    """Return pose and curvature of every course at all nodes, (nodes, 3 + segments, courses)."""
-    seen = [*range(3), *range(BODY_STATES, BODY_STATES + segments)]
+def _motions(kernel: Kernel, courses: Sequence[Course], layout: StateLayout) -> np.ndarray:
+    """Return pose and shape of every course at all nodes, (nodes, 3 + N-1 or more, courses)."""
+    seen = [*range(3), *layout.shape]
     found = np.empty((courses[0].h_s.size + 1, len(seen), len(courses)))
     found[0] = np.stack([c.x[seen] for c in courses], axis=1)
     for k in range(0, len(courses), LANES):

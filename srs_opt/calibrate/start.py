@@ -15,7 +15,7 @@ from srs_opt.model.registry import build
 def _start_function(structure: Structure) -> ca.Function:
     parameters, m, _ = build(structure)
     heading = ca.SX.sym("heading")
-    x, y = (ca.substitute(v[0], m.kappa, ca.SX.zeros(m.kappa.shape)) for v in (m.chain.x, m.chain.y))
+    x, y = (ca.substitute(v[0], m.shape, ca.SX.zeros(m.shape.shape)) for v in (m.chain.x, m.chain.y))
     c, s = ca.cos(heading), ca.sin(heading)
     pose = ca.vertcat(-(c * x - s * y), -(s * x + c * y), heading)
     p = parameters.vector

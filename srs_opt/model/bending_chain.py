@@ -5,8 +5,7 @@ recursion from the tail gives velocities and accelerations and one from the head
 
     g(Y, Y', Y'') = B^T (f - m r'') + (bending moments) - J theta'' = 0,    B = dr/dY.
 
-Chambers that lengthen do so with the curvature without load, a known function of time: chords then change by
-themselves too (`Growth`), and the curvature is a segment's turn over a length that changes.
+Chambers that lengthen do so in time: `srs_opt.model.chambers`.
 
 Derivatives, for implicit integration, are in `srs_opt.model.chain_derivatives`.
 """
@@ -17,37 +16,12 @@ from dataclasses import dataclass
 
 import casadi as ca
 
+from srs_opt.model.chambers import NO_GROWTH, Chambers, Drive, Growth, chord_function
 from srs_opt.model.compliant import CompliantModel
-from srs_opt.model.kinematics import Chain, segment_chord, straight_gap_chord
+from srs_opt.model.kinematics import Chain
 from srs_opt.model.mechanics import Forces
 
 Vector = tuple[ca.SX, ca.SX]
-
-
-@dataclass(frozen=True)
-class Drive:
-    """What the actuators and the room do at one instant: no-load curvatures (N-1,), frame (3,) in the room.
-
-    `frame` is (x, y, heading) of the axes in which Y stands. Only chambers that lengthen feel the acceleration.
-    """
-
-    no_load: ca.SX
-    no_load_rate: ca.SX
-    no_load_acceleration: ca.SX
-    frame: ca.SX
-
-
-@dataclass(frozen=True)
-class Growth:
-    """What chambers' lengthening adds to rate and acceleration of a chord, and of its derivative by the turn."""
-
-    rate: ca.SX
-    acceleration: ca.SX
-    slope_rate: ca.SX
-    slope_acceleration: ca.SX
-
-
-NO_GROWTH = Growth(*[ca.SX(1, 1)] * 4)
 
 
 @dataclass(frozen=True)
@@ -81,88 +55,6 @@ class Motion:
     acceleration: Vector
 
 
-@dataclass(frozen=True)
-class Chambers:
-    """The chambers' lengths (N-1, 1) at one instant, their rates and accelerations, and what a turn is per kappa.
-
-    Rates are structural zeros where nothing lengthens.
-    """
-
-    length: ca.SX
-    growth: ca.SX
-    growth_rate: ca.SX
-    turn_per_kappa: ca.SX
-
-    @staticmethod
-    def of(model: CompliantModel, drive: Drive) -> Chambers:
-        """Return them for the model's no-load curvatures at one instant."""
-        free, rate = ca.SX.sym("free", model.links - 1), ca.SX.sym("rate", model.links - 1)
-        acceleration = ca.SX.sym("acceleration", model.links - 1)
-        length = model.chamber_lengths(free)
-        growth = ca.jtimes(length, free, rate)
-        second = ca.jtimes(growth, ca.vertcat(free, rate), ca.vertcat(rate, acceleration))
-        found = ca.substitute(
-            ca.horzcat(length, growth, second),
-            ca.vertcat(free, rate, acceleration),
-            ca.vertcat(drive.no_load, drive.no_load_rate, drive.no_load_acceleration),
-        )
-        length, growth, second = ca.horzsplit(found)
-        return Chambers(length, growth, second, length + model.gap_length * model.gap_ratio)
-
-    def kappa(self, y: ca.SX) -> ca.SX:
-        """Return the curvatures, (N-1, 1)."""
-        return (y[3:] - y[2:-1]) * (1 / self.turn_per_kappa)
-
-    def dkappa(self, y: ca.SX, dy: ca.SX) -> ca.SX:
-        """Return the curvatures' rates."""
-        return (dy[3:] - dy[2:-1] - self.kappa(y) * self.growth) * (1 / self.turn_per_kappa)
-
-    def ddkappa(self, y: ca.SX, dy: ca.SX, ddy: ca.SX) -> ca.SX:
-        """Return the curvatures' accelerations."""
-        turn = ddy[3:] - ddy[2:-1] - 2 * self.growth * self.dkappa(y, dy) - self.growth_rate * self.kappa(y)
-        return turn * (1 / self.turn_per_kappa)
-
-    def of_chord(self, k: int, mixed: list[ca.SX], turn1: ca.SX) -> Growth:
-        """Return what lengthening adds to a chord's rates; `mixed` as `_chord_function` gives it."""
-        c_l, c_ll, c1_l, c1_ll, c2_l = mixed
-        rate, second = self.growth[k], self.growth_rate[k]
-        return Growth(
-            c_l * rate,
-            2 * c1_l * turn1 * rate + c_ll * rate**2 + c_l * second,
-            c1_l * rate,
-            2 * c2_l * turn1 * rate + c1_ll * rate**2 + c1_l * second,
-        )
-
-
-def _chord_function(model: CompliantModel) -> ca.Function:
-    """Return ``(kappa, length, p) -> (chord c, its first three derivatives by the turn, ..., cos, sin)``.
-
-    cos and sin are of half the turn. Where chambers lengthen, derivatives that involve the length l at a
-    fixed turn stand between: c_l, c_ll, c'_l, c'_ll, c''_l.
-    """
-    kappa, length, gap, ratio = ca.SX.sym("kappa"), ca.SX.sym("length"), model.gap_length, model.gap_ratio
-    straight, mixed = ca.SX(ratio).is_zero(), []
-    per_kappa = length + gap * ratio
-    if straight and not model.stretches:
-        jet, cos, sin = straight_gap_chord(kappa, length, gap)
-        jet = tuple(derivative * (1 / per_kappa) ** order for order, derivative in enumerate(jet))
-    else:
-        turn = ca.SX.sym("turn")
-        chord, _, cos, sin = segment_chord(turn / per_kappa, length, gap, ratio)
-        first = ca.jacobian(chord, turn)
-        second = ca.jacobian(first, turn)
-        jet = (chord, first, second, ca.jacobian(second, turn))
-        if model.stretches:
-            c_l, c1_l = ca.jacobian(chord, length), ca.jacobian(first, length)
-            mixed = [c_l, ca.jacobian(c_l, length), c1_l, ca.jacobian(c1_l, length)]
-            mixed.append(ca.jacobian(second, length))
-        found = ca.substitute(ca.vertcat(*jet, *mixed, cos, sin), turn, per_kappa * kappa)
-        *jet, cos, sin = ca.vertsplit(found)
-        jet, mixed = jet[:4], jet[4:]
-    p = model.parameters.vector
-    return ca.Function("chord", [kappa, length, p], [*jet, *mixed, cos, sin], {"cse": True})
-
-
 class BendingChain:
     """Builds expressions of one compliant model; N + 2 coordinates Y (see the module)."""
 
@@ -170,7 +62,7 @@ class BendingChain:
         self.model = model
         self.links = model.links
         self.size = model.links + 2
-        self._chord = _chord_function(model)
+        self._chord = chord_function(model)
 
     def chambers(self, drive: Drive) -> Chambers:
         """Return the chambers' lengths at one instant."""
@@ -196,9 +88,7 @@ class BendingChain:
             g[k + 1] += turn + stretch + q[k]
         return ca.vertcat(*joint[0], *g), h * f.friction_power
 
-    def rate_in_time(
-        self, y: ca.SX, dy: ca.SX, ddy: ca.SX, drive: Drive, jerk: ca.SX
-    ) -> tuple[ca.SX, ca.SX]:
+    def rate_in_time(self, y: ca.SX, dy: ca.SX, ddy: ca.SX, drive: Drive, jerk: ca.SX) -> tuple[ca.SX, ca.SX]:
         """Return the derivatives of g and the friction power by time at fixed Y, Y', Y''."""
         rate, acceleration = drive.no_load_rate, drive.no_load_acceleration
         if not self.model.stretches:
@@ -208,7 +98,9 @@ class BendingChain:
         state = [ca.SX.sym(name, self.size) for name in ("y", "dy", "ddy")]
         free = [ca.SX.sym(name, self.links - 1) for name in ("free", "rate", "acceleration", "jerk")]
         frame, p = ca.SX.sym("frame", 3), self.model.parameters.vector
-        both = ca.vertcat(*self.residual(*state, Drive(*free[:3], frame), ca.SX(1)))
+        y0, dy0, ddy0 = state
+        at = Drive(free[0], free[1], frame, free[2])
+        both = ca.vertcat(*self.residual(y0, dy0, ddy0, at, ca.SX(1)))
         in_time = ca.jtimes(both, ca.vertcat(*free[:3]), ca.vertcat(*free[1:]))
         function = ca.Function("rate_in_time", [*state, *free, frame, p], [in_time], {"cse": True})
         found = function(y, dy, ddy, drive.no_load, rate, acceleration, jerk, drive.frame, p)
@@ -229,7 +121,9 @@ class BendingChain:
         chambers, relaxation = self.chambers(drive), self.model.relaxation()
         stiffness = self.model.stiffness() * self._share(chambers) / chambers.turn_per_kappa
         # a turn on a chamber that lengthens loses curvature by itself
-        return stiffness * (1 - relaxation * chambers.growth / chambers.turn_per_kappa), stiffness * relaxation
+        return stiffness * (
+            1 - relaxation * chambers.growth / chambers.turn_per_kappa
+        ), stiffness * relaxation
 
     def motion(self, y: ca.SX, dy: ca.SX, ddy: ca.SX, h: ca.SX, drive: Drive) -> Motion:
         """Return the chain's motion; accelerations, like `ddy`, are h times the true ones."""

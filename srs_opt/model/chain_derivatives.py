@@ -10,12 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import casadi as ca
 
 from srs_opt.errors import UnsupportedEffectError
-from srs_opt.model.bending_chain import NO_GROWTH, BendingChain, Drive, Motion, Segment
+from srs_opt.model.bending_chain import BendingChain, Motion, Segment
 from srs_opt.model.chain_matrix import ChainMatrix, Rows
+from srs_opt.model.chambers import NO_GROWTH, Drive
 
 Pair = tuple[ca.SX, ca.SX]  # d(chord)/d(heading behind it, heading ahead of it), (2, 1) each
 MASS, VELOCITY, PLACE = range(3)  # what a link's load may be proportional to
@@ -96,9 +98,7 @@ def derivatives(chain: BendingChain, y: ca.SX, dy: ca.SX, ddy: ca.SX, drive: Dri
     power_r = _Loads.of(slopes.power_by_place)
     return Derivatives(
         mass=assembly.matrix({MASS: (moves, 1.0)}, _inertia(chain)),
-        by_rate=assembly.matrix(
-            {MASS: (moves1, -2.0), VELOCITY: (moves, 1.0)}, damper
-        ),
+        by_rate=assembly.matrix({MASS: (moves1, -2.0), VELOCITY: (moves, 1.0)}, damper),
         by_place=assembly.matrix(
             {MASS: (moves2, -1.0), VELOCITY: (moves1, 1.0), PLACE: (moves, 1.0)},
             spring.plus(turning),
@@ -224,7 +224,7 @@ def _springs(chain: BendingChain, stiffness: ca.SX) -> _Local:
     """Return the derivatives of moments on the headings of springs (N-1, 1) between neighbours."""
     none = ca.SX(1, 1)
     beside = [none, *ca.vertsplit(stiffness), none]
-    diagonal = [none, none, *(-behind - ahead for behind, ahead in zip(beside, beside[1:]))]
+    diagonal = [none, none, *(-behind - ahead for behind, ahead in pairwise(beside))]
     return _Local(diagonal, [none, *beside[:-1]], [none, *beside[:-1]])
 
 

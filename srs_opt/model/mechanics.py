@@ -50,8 +50,8 @@ class Mechanics(ABC):
         Curvatures that the actuators would give without load: the same unless segments bend under load.
     length : SX (N-1, 1)
         The chambers' lengths, m.
-    shape : SX
-        The symbols that the places of all points of the body depend on.
+    shape, shape_rate : SX
+        The symbols that the places of all points of the body depend on (`StateLayout.shape`), their rates.
     """
 
     def __init__(self, parameters: Parameters) -> None:
@@ -70,14 +70,23 @@ class Mechanics(ABC):
         self.gap_length, self.gap_ratio = gap, ratio
         self.length = self.chamber_lengths(self.no_load)
         growth = ca.jtimes(self.length, self.no_load, self.no_load_rate)
-        apart = self.stretches and not ca.is_equal(self.no_load, self.kappa)
-        self.shape = ca.vertcat(self.kappa, self.no_load) if apart else self.kappa
+        self.shape, self.shape_rate = self.kappa, self.dkappa
+        if self.stretches and parameters.structure.compliant:
+            self.shape = ca.vertcat(self.kappa, self.no_load)
+            self.shape_rate = ca.vertcat(self.dkappa, self.no_load_rate)
         self.chain = body_frame_chain(self.kappa, self.mass, self.length, gap, ratio, self.dkappa, growth)
         self.chain_rate = self.chain.rates
 
     def without_load(self) -> tuple[ca.SX, ca.SX]:
         """Return the curvatures without load and their rates, (N-1, 1) each."""
         return self.kappa, self.dkappa
+
+    def unloaded(self, expression: ca.SX) -> ca.SX:
+        """Return an expression for bends that are those without load."""
+        if not self.parameters.structure.compliant:
+            return expression
+        free = ca.vertcat(self.no_load, self.no_load_rate)
+        return ca.substitute(expression, free, ca.vertcat(self.kappa, self.dkappa))
 
     @property
     def stretches(self) -> bool:

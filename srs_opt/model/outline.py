@@ -18,7 +18,7 @@ def centre_line_function(structure: Structure, samples: int) -> ca.Function:
     """Return ``(kappa (N-1, samples), p) -> (x, y) (points, samples)`` in the robot's frame, tail to head.
 
     The first point is link 1, the last link N; every arc is given by its ends and points between, every
-    half gap by its ends.
+    half gap by its ends. Chambers that lengthen do so with the curvature that they have.
     """
     parameters, mechanics, _ = build(structure)
     p, kappa = parameters, mechanics.kappa
@@ -34,10 +34,11 @@ def centre_line_function(structure: Structure, samples: int) -> ca.Function:
             ys.append(y)
     # the chain stands on its tail here; its first link tells where the tail really is
     shift_x, shift_y = mechanics.chain.x[0], mechanics.chain.y[0]
+    points = (ca.vertcat(*xs) + shift_x, ca.vertcat(*ys) + shift_y)
     line = ca.Function(
         "centre_line",
         [kappa, p.vector],
-        [ca.vertcat(*xs) + shift_x, ca.vertcat(*ys) + shift_y],
+        [mechanics.unloaded(v) for v in points],
         {"cse": True},
     )
     return line.map("centre_lines", "serial", samples, [1], [])

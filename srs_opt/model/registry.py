@@ -38,4 +38,5 @@ def build(structure: Structure) -> tuple[Parameters, Mechanics, Actuator]:
 
 def state_layout(structure: Structure) -> StateLayout:
     """Return where things stand in the state of one structure."""
-    return StateLayout(structure.segments, structure.compliant, build(structure)[2].states)
+    _, mechanics, actuator = build(structure)
+    return StateLayout(structure.segments, structure.compliant, actuator.states, mechanics.stretches)

@@ -26,11 +26,14 @@ class StateLayout:
         Whether the bends are coordinates of their own (the compliant model).
     actuator_states : int
         Curvatures, their rates and memories, of all actuators together.
+    stretches : bool
+        Whether chambers lengthen as they are pressed.
     """
 
     segments: int
     compliant: bool
     actuator_states: int
+    stretches: bool = False
 
     @property
     def kappa(self) -> slice:
@@ -47,6 +50,21 @@ class StateLayout:
         """The actuators' states: the no-load curvatures, their rates, and memories."""
         start = self.dkappa.stop if self.compliant else BODY_STATES
         return slice(start, start + self.actuator_states)
+
+    @property
+    def shape(self) -> list[int]:
+        """Entries that tell where the body's points are in its frame: the curvatures.
+
+        Where bends are free and chambers lengthen with the curvature without load, that follows.
+        """
+        free = range(self.actuator.start, self.actuator.start + self.segments)
+        kappa = range(self.kappa.start, self.kappa.stop)
+        return [*kappa, *free] if self.compliant and self.stretches else [*kappa]
+
+    @property
+    def shape_rate(self) -> list[int]:
+        """Entries of the shape's rates."""
+        return [i + self.segments for i in self.shape]
 
     @property
     def size(self) -> int:

@@ -303,7 +303,8 @@ def _settled(cycle: Cycle, mesh: Mesh, tolerance: float) -> Search[tuple[np.ndar
 @lru_cache(maxsize=32)
 def _inertia_function(structure: Structure) -> ca.Function:
     parameters, mechanics, _ = build(structure)
-    outputs = [mechanics.yaw_inertia(), mechanics.yaw_momentum_of_shape()]
+    momenta = (mechanics.yaw_inertia(), mechanics.yaw_momentum_of_shape())
+    outputs = [mechanics.unloaded(v) for v in momenta]
     return ca.Function(
         "inertia", [mechanics.kappa, mechanics.dkappa, parameters.vector], outputs, {"cse": True}
     )

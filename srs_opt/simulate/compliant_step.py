@@ -20,8 +20,9 @@ from dataclasses import dataclass
 import casadi as ca
 
 from srs_opt.model.actuator import Actuator, ActuatorState
-from srs_opt.model.bending_chain import BendingChain, Chambers, Drive
+from srs_opt.model.bending_chain import BendingChain
 from srs_opt.model.chain_derivatives import derivatives, mass_matrix
+from srs_opt.model.chambers import Chambers, Drive
 from srs_opt.model.compliant import CompliantModel
 from srs_opt.model.parameters import Structure
 from srs_opt.model.registry import build, state_layout
@@ -95,7 +96,7 @@ def _stages(
     shapes = {c: actuator.advance(act, valve, c * h) if c else act for c in sorted(set(NODES))}
 
     def drive(at: ActuatorState) -> Drive:
-        return Drive(at.kappa, at.dkappa, actuator.rates(at, valve).dkappa, pose)
+        return Drive(at.kappa, at.dkappa, pose, actuator.rates(at, valve).dkappa)
 
     start = drive(act)
     force, power = chain.residual(y, dy, zero, start, ca.SX(1))
@@ -149,12 +150,12 @@ def _scaled(weight: float, i: _Increment) -> _Increment:
 
 
 def _conversions(model: CompliantModel) -> tuple[ca.Function, ca.Function]:
-    """Return (velocity, kappa, dkappa, free, p) -> (Y, Y') and (Y, Y', free, p) -> (moved, velocity, kappa, dkappa).
+    """Return (velocity, kappa, dkappa, free, p) -> (Y, Y') and the way back.
 
-    `free` are the no-load curvatures and their rates. Y stands in the robot's frame at the step's start;
-    `moved` is the pose (3,) in that frame.
+    The way back is (Y, Y', free, p) -> (moved, velocity, kappa, dkappa); `free` are the no-load curvatures
+    and their rates. Y stands in the robot's frame at the step's start; `moved` is the pose (3,) in it.
     """
-    p, free = model.parameters.vector, [model.no_load, model.no_load_rate]
+    p, free = model.parameters.vector, (model.no_load, model.no_load_rate)
     kappa, dkappa, velocity = model.kappa, model.dkappa, ca.SX.sym("velocity", 3)
     c, d, yaw_rate = model.chain, model.chain_rate, model.yaw_rate(velocity[2])
     v = model.link_velocities(velocity[0], velocity[1], yaw_rate)
@@ -177,7 +178,7 @@ def _conversions(model: CompliantModel) -> tuple[ca.Function, ca.Function]:
     )
     n = model.links
     y, dy = ca.SX.sym("y", n + 2), ca.SX.sym("dy", n + 2)
-    chambers = Chambers.of(model, Drive(*free, model.no_load_acceleration, ca.SX.zeros(3, 1)))
+    chambers = Chambers.of(model, Drive(*free, ca.SX.zeros(3, 1), model.no_load_acceleration))
     bend, rate = chambers.kappa(y), chambers.dkappa(y, dy)
     turn, spin = ca.sum1(y[2:]) / n, ca.sum1(dy[2:]) / n
     tail, tail_rate, momentum = body(bend, rate, spin, *free, p)

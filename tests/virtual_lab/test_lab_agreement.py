@@ -15,7 +15,7 @@ from virtual_lab.catalogue import LISTED
 from virtual_lab.draw import draw_effect
 from virtual_lab.simulate import run
 from virtual_lab.trials import Trial
-from virtual_lab.truth import Truth
+from virtual_lab.truth import Parameters, Truth
 
 DURATION_S = 2.0
 TRIAL = Trial("t", 2.0, 55.0, 0.4, duration_s=DURATION_S)
@@ -23,9 +23,9 @@ TRIAL = Trial("t", 2.0, 55.0, 0.4, duration_s=DURATION_S)
 TOLERANCE_M = {"fill_exhaust_asymmetry": 2e-3}
 
 
-def compare(effects, tolerance_m):
-    robot = wpi_srs().with_values(effects=effects, friction_speed_m_s=0.002)
-    truth = Truth(effects=effects, friction_speed_m_s=0.002)
+def compare(effects, tolerance_m, **robot_values):
+    robot = wpi_srs().with_values(effects=effects, friction_speed_m_s=0.002, **robot_values)
+    truth = Truth(Parameters(**robot_values), effects=effects, friction_speed_m_s=0.002)
     start = run(truth, TRIAL, np.zeros(1)).centre_of_mass()[0]
     integrator = Integrator(robot)
     timeline = Timeline.of_gait(published_wave(robot, 2.0, 55.0, 0.4).gait(), DURATION_S)
@@ -43,3 +43,9 @@ def test_without_any_effect():
 def test_with_one_effect(name):
     effect = draw_effect(LISTED[name], np.random.default_rng(6), 5, (1.0, 1.0))
     compare((effect,), TOLERANCE_M.get(name, 2e-5))
+
+
+@pytest.mark.parametrize("others", [(), ({"name": "gap_bending", "ratio": 0.5},)])
+def test_chambers_that_lengthen_on_a_soft_body(others):
+    """They lengthen with the curvature without load, whatever the load leaves of the bend."""
+    compare(({"name": "chamber_stretch", "per_curv2": 3e-4}, *others), 5e-6, bending_stiffness_n_m2=0.005)

@@ -62,7 +62,7 @@ def test_chambers_that_lengthen_move_the_links_as_their_places_say(bends):
     rng = np.random.default_rng(5)
     p = Parameters(bending_stiffness_n_m2=0.005 if bends else None)
     hidden = ({"name": "chamber_stretch", "per_curv2": 3e-4},)
-    tables = assemble(Truth(p, unlisted=hidden), Trial("still", 1.0, 0.0, kind="still"), 1.0)
+    tables = assemble(Truth(p, effects=hidden), Trial("still", 1.0, 0.0, kind="still"), 1.0)
     free = np.column_stack([rng.normal(0, s, 4) for s in (10.0, 50.0, 0.0, 500.0)])
     bent = np.column_stack([rng.normal(0, s, 4) for s in (10.0, 50.0, 0.0, 500.0)]) if bends else free
     lengths, chain = np.empty((4, 3)), np.zeros((5, kernel.CHAIN_COLUMNS))

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import casadi as ca
 
-from srs_opt.model.bending_chain import BendingChain, Drive
+from srs_opt.model.bending_chain import BendingChain
 from srs_opt.model.chain_derivatives import mass_matrix
+from srs_opt.model.chambers import Drive
 from srs_opt.model.compliant import CompliantModel
 
 
@@ -24,7 +25,7 @@ def bend_acceleration(model: CompliantModel, velocity: ca.SX, heading: ca.SX) ->
     place, rate = model.chain, model.link_velocities(velocity[0], velocity[1], yaw_rate)
     y = ca.vertcat(place.x[0], place.y[0], place.angle)
     dy = ca.vertcat(rate.x[0], rate.y[0], rate.angle)
-    free = model.no_load, model.no_load_rate, model.no_load_acceleration
-    drive = Drive(*free, ca.vertcat(0, 0, heading))
+    frame = ca.vertcat(0, 0, heading)
+    drive = Drive(model.no_load, model.no_load_rate, frame, model.no_load_acceleration)
     force, _ = chain.residual(y, dy, ca.SX.zeros(chain.size, 1), drive, ca.SX(1))
     return chain.chambers(drive).ddkappa(y, dy, mass_matrix(chain, y, drive).solver()(force))

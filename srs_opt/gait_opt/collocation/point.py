@@ -175,7 +175,7 @@ def _linear_curvature(kind: PointKind, s: _Symbols) -> tuple[ca.SX, ca.SX, ca.SX
 def _shape(
     kind: PointKind, actuator: Actuator, s: _Symbols, closed: ca.SX, deviation: ca.SX
 ) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
-    """Return curvatures, rates, accelerations, and the rates of the actuators' deviation from the closed form.
+    """Return curvatures, rates, accelerations, and the rates of the deviation from the closed form.
 
     `closed` stacks what `_linear_curvature` returns. Relaxed, the actuators' states are
     collocated themselves.

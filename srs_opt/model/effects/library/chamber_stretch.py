@@ -9,7 +9,7 @@ EFFECT = Effect(
     "chamber_stretch",
     "body",
     (EffectParameter("per_curv2", "m^2", 2e-4, lower=0),),
-    what="chambers lengthen under pressure, by a share that grows with the square of their curvature without load",
-    look="press one lifted segment and measure its arc, or the distance of the wheels beside it, against rest",
+    what="chambers lengthen under pressure, by the square of their curvature without load",
+    look="press one lifted segment and measure its arc against that at rest",
     stretch=lambda e, no_load: e["per_curv2"] * no_load**2,
 )
