@@ -103,11 +103,3 @@ def _rigid(track: np.ndarray, points: np.ndarray, later_s: float) -> Alignment:
     turn = float(np.angle(((z - z.mean()) * np.conj(p - p.mean())).sum()))
     shift = z.mean() - np.exp(1j * turn) * p.mean()
     return Alignment(later_s, turn, np.array([shift.real, shift.imag]))
-
-
-def without(columns: np.ndarray, free: np.ndarray, seen: np.ndarray) -> np.ndarray:
-    """Return columns (n, K) less what the free unknowns (n, 4) make of them where seen (n,)."""
-    basis = np.linalg.qr(free[seen] / np.linalg.norm(free[seen], axis=0))[0]
-    left = np.array(columns, dtype=float)
-    left[seen] -= basis @ (basis.T @ left[seen])
-    return left

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from srs_opt.calibrate.coordinates import Coordinate
 from srs_opt.calibrate.gram import TrialGram
 from srs_opt.calibrate.instruments import NAME, reading_gram, readings
 from srs_opt.calibrate.model import Model
-from srs_opt.calibrate.noise import track_of
+from srs_opt.calibrate.noise import Noise, track_of
 from srs_opt.calibrate.nominal import tolerance_for
 from srs_opt.calibrate.trials import Extra, Point, Request, Trials
 from srs_opt.errors import NoAnswerError
@@ -28,8 +29,8 @@ class Experiment:
     ----------
     model : Model
     trials : sequence of Trial
-    sd_m : float
-        Noise per coordinate.
+    noise : Noise, or float
+        A number is the standard deviation per coordinate of white noise, m.
     bench : Bench, optional
         Readings of other instruments to hold the model against too.
     where : Executor, optional
@@ -42,19 +43,32 @@ class Experiment:
         self,
         model: Model,
         trials: Sequence[Trial],
-        sd_m: float,
+        noise: Noise | float,
         bench: Bench | None = None,
         where: Executor = HERE,
         groups: Sequence[Sequence[Trial]] = (),
     ) -> None:
-        self.model, self.trials, self.sd_m = model, tuple(trials), sd_m
+        self.model, self.trials = model, tuple(trials)
+        self.noise = noise if isinstance(noise, Noise) else Noise(noise)
         self.readings = readings(model, bench) if bench is not None else ()
         count = sum(track.size for track in map(track_of, self.trials) if track is not None)
         self.keeps = count <= MOST_KEPT
-        self.work = Trials(model, self.trials, sd_m, tolerance_for(count, sd_m), keeps=self.keeps)
+        tolerance = tolerance_for(count, self.noise.white_sd_m)
+        self.work = Trials(model, self.trials, self.noise, tolerance, keeps=self.keeps)
         ordered = [sorted(group, key=lambda t: -t.frequency_hz) for group in groups or (self.trials,)]
         costs = [{t.name: float(t.time_s[-1]) for t in group} for group in ordered]
         self._shared = where.share(self.work, costs)
+
+    @property
+    def sd_m(self) -> float:
+        """White noise per coordinate."""
+        return self.noise.white_sd_m
+
+    def with_noise(self, noise: Noise) -> Experiment:
+        """Return the same trials, and what is remembered of them, under another noise."""
+        other = copy(self)
+        other.noise = noise
+        return other
 
     def _ask(self, trials: Sequence[Trial], request: Request) -> dict[str, Any]:
         found = self._shared.ask([t.name for t in trials], request)
@@ -95,7 +109,7 @@ class Experiment:
             If a trial cannot be simulated there.
         """
         stale = stale and self.keeps and extra is None
-        request = Request(point, tuple(coordinates), extra, stale, rough)
+        request = Request(point, tuple(coordinates), extra, stale, rough, self.noise)
         found: dict[str, TrialGram] = self._ask(self.trials if trials is None else trials, request)
         if self.readings and found:
             further = next(iter(found.values())).raw.shape[0] - 1 - len(coordinates)

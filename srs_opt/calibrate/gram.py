@@ -12,6 +12,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from srs_opt.calibrate.whiten import Whitening, serial_correlation
+
 RANK = 1e-12  # of the largest eigenvalue of scaled normal equations; below it a direction is unknown
 
 
@@ -161,15 +163,38 @@ class Eliminated:
 def trial_gram(
     residual: np.ndarray,
     slopes: np.ndarray,
-    sd: float,
+    whiten: Whitening,
     scattered: Sequence[int],
     scatter_sd: np.ndarray,
     scatter_now: np.ndarray,
+    own: np.ndarray | None = None,
+    own_sd: np.ndarray | None = None,
 ) -> TrialGram:
-    """Return one trial's Gram matrix for residuals (n,), NaN where lost, and slopes (n, K)."""
-    seen = np.isfinite(residual)
-    both = np.column_stack([slopes[seen], residual[seen]]) / sd
-    return TrialGram(both.T @ both, int(seen.sum()), tuple(scattered), scatter_sd, scatter_now)
+    """Return one trial's Gram matrix for residuals (n,) and slopes (n, K), (T C) in a row.
+
+    Parameters
+    ----------
+    own : array (n, Q), optional
+        Columns of further unknowns of this trial alone, which are integrated out.
+    own_sd : array (Q,), optional
+        Priors of their amplitudes; infinite where nothing is known.
+    """
+    whole = [slopes, residual[:, None]] if own is None else [slopes, residual[:, None], own]
+    both = whiten(np.concatenate(whole, axis=1))
+    size = slopes.shape[1] + 1
+    raw = both.T @ both
+    left = both[:, size - 1]
+    if own is not None and own_sd is not None:
+        scale = 1 / np.sqrt(np.maximum(np.diag(raw)[size:], 1e-300))
+        inner = raw[size:, size:] * scale[:, None] * scale + np.diag((scale / own_sd) ** 2)
+        # columns that were nowhere seen have no part in anything
+        back = np.linalg.pinv(inner, rcond=RANK, hermitian=True) @ (scale[:, None] * raw[size:, :size])
+        left = left - both[:, size:] @ (scale * back[:, -1])
+        raw = raw[:size, :size] - (scale[:, None] * raw[size:, :size]).T @ back
+        raw = (raw + raw.T) / 2
+    count = both.shape[0] - (0 if own_sd is None else int(np.sum(np.isinf(own_sd))))
+    serial = serial_correlation(whiten.in_place(left))
+    return TrialGram(raw, count, tuple(scattered), scatter_sd, scatter_now, serial)
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,11 @@
-"""The markers' noise from the tracks themselves: fourth differences leave noise and hardly any motion."""
+"""The camera's noise: what is known of it, and its white part from the tracks themselves.
+
+Fourth differences of a track leave noise and hardly any motion.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from math import comb
 
 import numpy as np
@@ -14,21 +18,57 @@ _MAD = 0.674489750196  # median |x| of a unit normal
 _WILD = 5.0  # robust standard deviations beyond which a difference is a jump, not noise
 
 
+@dataclass(frozen=True)
+class Noise:
+    """Covariance of a trial's measured values: everything that is neither the model nor the trial's scatter.
+
+    Attributes
+    ----------
+    white_sd_m : float
+        Standard deviation per coordinate, independent from frame to frame.
+    correlated_sd_m, correlation_s : float
+        Further noise per coordinate, an Ornstein-Uhlenbeck process of its own: sd^2 exp(-|dt|/correlation_s).
+    drift_m : float
+        Standard deviation, per direction, of how far the whole picture creeps in a trial.
+    systematic_m : float
+        Standard deviation of the amplitudes of smooth errors that repeat with the gait (`smooth_terms`).
+    """
+
+    white_sd_m: float
+    correlated_sd_m: float = 0.0
+    correlation_s: float = 0.0
+    drift_m: float = 0.0
+    systematic_m: float = 0.0
+
+    @property
+    def in_words(self) -> str:
+        """What it is made of."""
+        parts = [f"{1e3 * self.white_sd_m:.2g} mm white"]
+        if self.correlated_sd_m > 0:
+            parts.append(f"{1e3 * self.correlated_sd_m:.2g} mm correlated over {self.correlation_s:.2g} s")
+        if self.drift_m > 0:
+            parts.append(f"{1e3 * self.drift_m:.2g} mm of drift in a trial")
+        if self.systematic_m > 0:
+            parts.append(f"{1e3 * self.systematic_m:.2g} mm that repeats with the gait")
+        return ", ".join(parts)
+
+    @property
+    def smooth(self) -> bool:
+        """Whether there are smooth terms."""
+        return self.drift_m > 0 or self.systematic_m > 0
+
+
 def track_of(trial: Trial) -> np.ndarray | None:
     """Return the trial's measured coordinates, (T, 2 M), NaN where lost."""
     points = trial.markers_m if trial.markers_m is not None else trial.centre_m
     return None if points is None else points.reshape(len(trial.time_s), -1)
 
 
-def noise_sd_m(dataset: DataSet) -> float:
-    """Return the noise per coordinate that a fit of independent samples is to assume.
-
-    The white part is estimated from the tracks; one that the data set states to be correlated in time adds
-    the white noise with the same spectral density at frequencies below 1/correlation_s, where motion is:
-    exponentially correlated noise has 2 sd^2 tau there, white noise of n samples a second sd^2/n.
-    """
-    correlated = 2 * dataset.correlated_sd_m**2 * dataset.correlation_s * dataset.rate_hz
-    return float(np.hypot(_white_sd_m(dataset), np.sqrt(correlated)))
+def noise_of(dataset: DataSet) -> Noise:
+    """Return the noise that is known before any fit: the white part as the tracks show it, else as stated."""
+    if not dataset.correlated_sd_m:
+        return Noise(_white_sd_m(dataset))
+    return Noise(_white_sd_m(dataset), dataset.correlated_sd_m, dataset.correlation_s)
 
 
 def _white_sd_m(dataset: DataSet) -> float:

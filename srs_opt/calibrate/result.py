@@ -11,6 +11,7 @@ import numpy as np
 from srs_opt.calibrate.candidates import entry_after
 from srs_opt.calibrate.coordinates import Coordinate
 from srs_opt.calibrate.fit import Fit
+from srs_opt.calibrate.noise import Noise
 from srs_opt.robot import Robot
 
 OFF_BENCH = 3.0  # standard deviations of the bench; by chance one value in 370 lies further off
@@ -36,6 +37,8 @@ class Calibration:
         Root mean square misfit over the noise, at the bench values and at the estimates.
     off_bench : mapping
         By how many of its deviations each value lies from its bench value.
+    noise : Noise or None
+        That the tracks show; None from maps.
     sd_with_tracks : dict or None
         For a calibration from maps alone: the deviations that tracks of the same gaits would leave.
     """
@@ -48,6 +51,7 @@ class Calibration:
     before: float
     after: float
     off_bench: Mapping[str, float] = field(default_factory=dict)
+    noise: Noise | None = None
     sd_with_tracks: dict[str, float] | None = None
 
     @property
@@ -79,7 +83,9 @@ def calibrated_robot(robot: Robot, fit: Fit) -> Robot:
     return robot.with_values(**changes, effects=effects, relative_sd=deviations, sources=sources)
 
 
-def calibration(robot: Robot, fit: Fit, before: float, after: float) -> Calibration:
+def calibration(
+    robot: Robot, fit: Fit, before: float, after: float, noise: Noise | None = None
+) -> Calibration:
     """Return the calibration behind a fit of the base coordinates."""
     corrected = calibrated_robot(robot, fit)
     index = [i for i, c in enumerate(fit.coordinates) if c.reported]
@@ -97,6 +103,7 @@ def calibration(robot: Robot, fit: Fit, before: float, after: float) -> Calibrat
         before,
         after,
         fit.off_bench,
+        noise,
     )
 
 

@@ -7,12 +7,16 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from srs_opt.calibrate.candidates import fitted_coordinates
+from srs_opt.calibrate.clean import mended
+from srs_opt.calibrate.colour import coloured
 from srs_opt.calibrate.experiment import Experiment
-from srs_opt.calibrate.fit import fit, start_point
+from srs_opt.calibrate.fit import Fit, fit, start_point
 from srs_opt.calibrate.maps import fit_maps
 from srs_opt.calibrate.model import Model
-from srs_opt.calibrate.noise import noise_sd_m
+from srs_opt.calibrate.noise import Noise, noise_of
 from srs_opt.calibrate.result import Calibration, calibration
+from srs_opt.calibrate.slow import Amplitudes, smooth_part
+from srs_opt.calibrate.smooth import DRIFTS, unit_terms
 from srs_opt.errors import InputError
 from srs_opt.measurement.records import DataSet
 from srs_opt.parallel import HERE, Executor
@@ -39,6 +43,7 @@ def calibrate(
     from srs_opt.calibrate.usable import usable
 
     tell = report or (lambda message: None)
+    dataset = _mended(dataset, tell)
     trials = [t for t in dataset.trials if not usable(t)]
     for t in dataset.trials:
         if usable(t):
@@ -55,10 +60,37 @@ def calibrate(
                 f"robot '{dataset.robot.name}' and the set's markers make {expected}"
             )
     base = fitted_coordinates(dataset.robot)
-    experiment = Experiment(Model(dataset.robot, model), trials, noise_sd_m(dataset), dataset.bench, where)
+    experiment = Experiment(Model(dataset.robot, model), trials, noise_of(dataset), dataset.bench, where)
     found = fit(experiment, base, start_point(base), report=tell)
+    noise = _noise_left(experiment, found)
+    if noise != experiment.noise:
+        tell(f"noise: {noise.in_words}")
+        experiment = experiment.with_noise(noise)
+        start_ratio = found.start_misfit_ratio
+        found = replace(fit(experiment, base, found.point, report=tell), start_misfit_ratio=start_ratio)
     before, after = math.sqrt(found.start_misfit_ratio), math.sqrt(found.misfit_ratio)
-    return calibration(dataset.robot, found, before, after)
+    return calibration(dataset.robot, found, before, after, noise)
+
+
+def _mended(dataset: DataSet, tell: Callable[[str], None]) -> DataSet:
+    """Return the data set without outliers and with labels in order."""
+    found = mended(dataset)
+    if found.outliers:
+        tell(f"{sum(found.outliers.values())} positions left out that lie far from those before and after")
+    if found.swapped:
+        tell(f"labels put right in trials {', '.join(found.swapped)}")
+    return found.dataset
+
+
+def _noise_left(experiment: Experiment, found: Fit) -> Noise:
+    """Return the noise that a fit's residuals show, smooth errors only if they explain all that is left."""
+    trials, first = experiment.trials, len(found.coordinates)
+    noise = coloured(experiment.noise, trials, experiment.residuals(trials, found.point))
+    grams = experiment.with_noise(noise).grams(found.point, found.coordinates, extra=unit_terms)
+    columns = range(first, next(iter(grams.values())).raw.shape[0] - 1)
+    units = [dict.fromkeys(some, 1.0) for some in (columns[:DRIFTS], columns[DRIFTS:])]
+    amplitudes = {t.name: Amplitudes(*units) for t in trials}
+    return smooth_part(noise, grams, amplitudes, found.coordinates, found.point)
 
 
 def going_on_from(dataset: DataSet, robot: Robot) -> DataSet:

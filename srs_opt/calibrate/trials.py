@@ -6,20 +6,21 @@ so the answers are the same to the last bit whoever simulates which trials.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 
 import numpy as np
 
-from srs_opt.calibrate.alignment import FREE, align, without
+from srs_opt.calibrate.alignment import FREE, align
 from srs_opt.calibrate.coordinates import SCATTER_SD, Coordinate
 from srs_opt.calibrate.gram import TrialGram, trial_gram
 from srs_opt.calibrate.model import Model
-from srs_opt.calibrate.noise import track_of
+from srs_opt.calibrate.noise import Noise, track_of
 from srs_opt.calibrate.nominal import ATTEMPTS, Meshes, Nodes, TrialRun
 from srs_opt.calibrate.observe import Prediction, predict
+from srs_opt.calibrate.smooth import smooth_terms
+from srs_opt.calibrate.whiten import Whitening
 from srs_opt.errors import NoAnswerError
 from srs_opt.measurement.records import Trial
 from srs_opt.robot import Robot
@@ -73,6 +74,8 @@ class Request:
         Whether slopes of the last request for the same coordinates serve.
     rough : bool
         Whether the motions need not be better than a model can say that leaves a plain misfit.
+    noise : Noise, optional
+        Default: the trials' own.
     """
 
     point: Point
@@ -80,6 +83,7 @@ class Request:
     extra: Extra | None = None
     stale: bool = False
     rough: bool = False
+    noise: Noise | None = None
 
 
 class Trials:
@@ -89,8 +93,7 @@ class Trials:
     ----------
     model : Model
     trials : sequence of Trial
-    sd_m : float
-        Noise per coordinate.
+    noise : Noise
     tolerance_m_s : float
         Of the simulation.
     keeps : bool
@@ -98,12 +101,13 @@ class Trials:
     """
 
     def __init__(
-        self, model: Model, trials: Sequence[Trial], sd_m: float, tolerance_m_s: float, *, keeps: bool
+        self, model: Model, trials: Sequence[Trial], noise: Noise, tolerance_m_s: float, *, keeps: bool
     ) -> None:
-        self.model, self.sd_m, self.tolerance_m_s, self.keeps = model, sd_m, tolerance_m_s, keeps
+        self.model, self.noise, self.tolerance_m_s, self.keeps = model, noise, tolerance_m_s, keeps
         self._trials = {t.name: t for t in trials}
         self.runs = {t.name: TrialRun(model, t) for t in trials}
         self._tracks = {t.name: track_of(t) for t in trials}
+        self._whitenings: dict[str, tuple[Noise, Whitening]] = {}
         self._slopes: dict[str, Slopes] = {}
         self._new_slopes: set[str] = set()
         self._motions: dict[str, tuple[Place, Nodes]] = {}
@@ -114,12 +118,12 @@ class Trials:
         """Travel without the compiled model and without what was found."""
         model = self.model.robot, self.model.name
         trials = tuple(self._trials.values())
-        return _restored, (*model, trials, self.sd_m, self.tolerance_m_s, self.keeps)
+        return _restored, (*model, trials, self.noise, self.tolerance_m_s, self.keeps)
 
     def part(self, names: Sequence[str]) -> Trials:
         """Return these trials alone, as if nothing had been asked."""
         trials = [self._trials[n] for n in names]
-        return Trials(self.model, trials, self.sd_m, self.tolerance_m_s, keeps=self.keeps)
+        return Trials(self.model, trials, self.noise, self.tolerance_m_s, keeps=self.keeps)
 
     def memory(self, names: Sequence[str], request: Request | None) -> dict[str, Memory]:
         """Return what the trials go on from: with slopes if `request` uses them, or those that are new."""
@@ -231,26 +235,37 @@ class Trials:
         if extra is not None:
             further = extra(self._trials[name], prediction).reshape(residual.size, -1)
             slopes = np.column_stack([slopes, further])
-        if prediction.free is not None:
-            own = prediction.free.reshape(residual.size, -1)
-            slopes = without(slopes, own, np.isfinite(residual.ravel()))
+        noise = request.noise or self.noise
+        own, own_sd = self._own(name, prediction, noise)
         scattered = [names.index(n) for n in SCATTER_SD]
         now = point.scatter.get(name, np.zeros(len(SCATTER_SD)))
-        gram = trial_gram(residual.ravel(), slopes, self.sd_m, scattered, self._scatter_sd, now)
-        fitted = 0 if prediction.free is None else FREE
-        serial = serial_correlation(residual / self.sd_m)
-        return replace(gram, count=gram.count - fitted, serial=serial, stale=stale)
+        whiten = self._whitening(name, noise)
+        gram = trial_gram(residual.ravel(), slopes, whiten, scattered, self._scatter_sd, now, own, own_sd)
+        return replace(gram, stale=stale)
 
+    def _own(
+        self, name: str, prediction: Prediction, noise: Noise
+    ) -> tuple[np.ndarray | None, np.ndarray | None]:
+        """Return the columns of what is a trial's alone, and their priors: its alignment, smooth errors."""
+        parts = []
+        if prediction.free is not None:
+            parts.append((prediction.free.reshape(-1, FREE), np.full(FREE, np.inf)))
+        if noise.smooth:
+            frames, coordinates = prediction.points.shape
+            heading = prediction.pose[:, 2]
+            parts.append(smooth_terms(self._trials[name], frames, coordinates, heading, noise))
+        if not parts:
+            return None, None
+        return np.concatenate([p[0] for p in parts], axis=1), np.concatenate([p[1] for p in parts])
 
-def serial_correlation(residual: np.ndarray, lags: int = 8) -> float:
-    """Return the standardised sum of products of residuals (T, n) up to `lags` frames apart (NaN: lost)."""
-    total, count = 0.0, 0
-    for lag in range(1, min(lags, residual.shape[0] - 1) + 1):
-        products = residual[lag:] * residual[:-lag]
-        seen = np.isfinite(products)
-        total += float(products[seen].sum())
-        count += int(seen.sum())
-    return total / math.sqrt(count) if count else 0.0
+    def _whitening(self, name: str, noise: Noise) -> Whitening:
+        known = self._whitenings.get(name)
+        if known is None or known[0] != noise:
+            track = self._tracks[name]
+            assert track is not None
+            known = noise, Whitening(noise, self._trials[name].time_s, np.isfinite(track))
+            self._whitenings[name] = known
+        return known[1]
 
 
 @lru_cache(maxsize=4)
@@ -259,6 +274,6 @@ def _model(robot: Robot, model: str) -> Model:
 
 
 def _restored(
-    robot: Robot, model: str, trials: Sequence[Trial], sd_m: float, tolerance_m_s: float, keeps: bool
+    robot: Robot, model: str, trials: Sequence[Trial], noise: Noise, tolerance_m_s: float, keeps: bool
 ) -> Trials:
-    return Trials(_model(robot, model), trials, sd_m, tolerance_m_s, keeps=keeps)
+    return Trials(_model(robot, model), trials, noise, tolerance_m_s, keeps=keeps)

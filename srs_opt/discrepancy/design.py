@@ -171,10 +171,10 @@ def _trial_gains(
     free = [k for k in range(len(other.fit.coordinates)) if other.fit.covariance[k, k] > 0]
     none = np.zeros(len(other.fit.coordinates))
     try:
-        blank = Experiment(experiment.model, trials, experiment.sd_m)  # its markers stand at zero
+        blank = Experiment(experiment.model, trials, experiment.noise)  # its markers stand at zero
         against = blank.residuals(trials, Point(truth.fit.point.values))
         seen = [replace(t, markers_m=-r.reshape(r.shape[0], -1, 2)) for t, r in zip(trials, against)]
-        grams = Experiment(experiment.model, seen, experiment.sd_m).grams(
+        grams = Experiment(experiment.model, seen, experiment.noise).grams(
             Point(other.fit.point.values), other.fit.coordinates
         )
     except NoAnswerError:

@@ -83,6 +83,21 @@ def project(
     return score, (covariance + covariance.T) / 2
 
 
+def with_shared(covariance: np.ndarray, sd: np.ndarray) -> np.ndarray:
+    """Return the scores' covariance where columns also act at random, alike in all trials.
+
+    Parameters
+    ----------
+    covariance : array (E, E)
+        Of the noise alone, from `project`.
+    sd : array (E,)
+        Deviation of each column's coefficient; 0 for those that do not.
+    """
+    acting = sd > 0
+    part = covariance[:, acting] * sd[acting]
+    return np.asarray(covariance + part @ part.T)
+
+
 def detect(
     score: np.ndarray,
     covariance: np.ndarray,

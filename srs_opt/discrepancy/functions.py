@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from srs_opt.calibrate.noise import Noise
 from srs_opt.calibrate.observe import Prediction
+from srs_opt.calibrate.slow import Amplitudes
 from srs_opt.measurement.records import Trial
 
 
@@ -80,6 +83,33 @@ class ResidualFunctions:
             start += count
         return tuple(found)
 
+    def amplitudes(self, trials: Sequence[Trial], first: int) -> dict[str, Amplitudes]:
+        """Return what smooth errors of every trial are made of: columns, counted from `first`.
+
+        The picture's creeping is a shift that grows evenly, about its mean; what repeats with the gait are
+        its waves in any pattern.
+        """
+        return {t.name: self._amplitudes(first, max(float(np.ptp(t.time_s)), 1e-9)) for t in trials}
+
+    def _amplitudes(self, first: int, duration_s: float) -> Amplitudes:
+        drift: dict[int, float] = {}
+        systematic: dict[int, float] = {}
+        for group in self.groups():
+            own = [first + k for k in group.columns]
+            if group.against == "time" and group.where in ("motion along", "motion across"):
+                drift |= {own[0]: 0.5 / UNIT_M, own[1]: 1 / (UNIT_M * duration_s)}
+            if group.against == "gait phase":
+                systematic |= dict.fromkeys(own, 1 / UNIT_M)
+        return Amplitudes(drift, systematic)
+
+    def repeated_sd(self, noise: Noise) -> np.ndarray:
+        """Return by how much errors that repeat with the gait move every column alike in all trials."""
+        with_gait = ("gait phase", "frequency", "pressure", "steering offset")
+        size = noise.systematic_m / UNIT_M
+        return np.concatenate(
+            [np.full(len(g.columns), size * (g.against in with_gait)) for g in self.groups()]
+        )
+
     def __call__(self, trial: Trial, prediction: Prediction) -> np.ndarray:
         """Return the functions at a trial's values, (T, 2 M, columns), in millimetres."""
         frames = trial.time_s.size
@@ -94,9 +124,10 @@ class ResidualFunctions:
             for function in functions
         ]
         columns += _room(points, trial.time_s)
-        return 1e-3 * np.stack(columns, axis=2)
+        return UNIT_M * np.stack(columns, axis=2)
 
 
+UNIT_M = 1e-3
 _AGAINST = (
     ("time", 2),
     ("gait phase", 4),

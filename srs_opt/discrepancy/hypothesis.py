@@ -17,6 +17,9 @@ from srs_opt.measurement.records import Trial
 
 ITERATIONS = 20
 SMALL, LARGE = 0.15, 4.0  # sizes over typical that a named effect may have in company, and alone
+# share of the misfit that a second or later effect may leave and still count as progress: what is added is
+# the largest of what is missing, so that of three effects the third leaves no more
+LEFT = 0.5
 FAR = 3.5  # standard deviations that a calibrated value may lie from its bench value
 
 
@@ -106,3 +109,19 @@ def fit_hypothesis(
     coordinates = (*base, *(c for k in candidates for c in k.coordinates))
     found = fit(experiment, coordinates, start, trials, iterations, beat=beat, near=near, rough=rough)
     return Hypothesis(tuple(candidates), found)
+
+
+def cost(hypothesis: Hypothesis) -> float:
+    """Return the deviance, counting 2 per parameter."""
+    return hypothesis.deviance + 2 * hypothesis.parameters
+
+
+def left_of(before: Hypothesis, after: Hypothesis) -> float:
+    """Return the share of a misfit beyond the noise that is left."""
+    return (after.fit.misfit_ratio - 1) / max(before.fit.misfit_ratio - 1, 1e-9)
+
+
+def stuck(before: Hypothesis, after: Hypothesis) -> bool:
+    """Whether piling up effects only nibbles at the misfit: what is missing is none of them."""
+    left = left_of(before, after)
+    return len(after.candidates) > 1 and after.fit.misfit_ratio > 1.2 and left > LEFT

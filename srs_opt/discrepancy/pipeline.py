@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from srs_opt.calibrate.candidates import Candidate, all_candidates, fitted_coordinates
+from srs_opt.calibrate.clean import mended
 from srs_opt.calibrate.experiment import Experiment
 from srs_opt.calibrate.fit import FAR_OFF
 from srs_opt.calibrate.forms import form_of_entry
 from srs_opt.calibrate.model import Model
-from srs_opt.calibrate.noise import noise_sd_m
+from srs_opt.calibrate.noise import noise_of
 from srs_opt.discrepancy.alike import Pair, alike_pairs
 from srs_opt.discrepancy.design import NextExperiment, next_experiment, rivals_of
 from srs_opt.discrepancy.examined import Examined
@@ -109,14 +110,15 @@ def find_discrepancy(
     """
     started = time.perf_counter()
     tell = report or (lambda message: None)
+    dataset = mended(dataset).dataset
     split = split_trials(dataset.trials, seed)
-    sd = noise_sd_m(dataset)
+    noise = noise_of(replace(dataset, trials=split.open))
     if not split.enough:
-        return _not_testable(dataset, split, sd, started)
+        return _not_testable(dataset, split, noise.white_sd_m, started)
     quick = few_and_brief(split.open, seed)
     trials = (*split.open, *split.sealed, *quick)
     groups = split.open, quick, split.sealed
-    experiment = Experiment(Model(dataset.robot, model), trials, sd, dataset.bench, where, groups)
+    experiment = Experiment(Model(dataset.robot, model), trials, noise, dataset.bench, where, groups)
     candidates = _candidates(dataset, effects, experiment.model)
     search = Search(experiment, fitted_coordinates(dataset.robot), candidates, split.open, seed, tell, quick)
     return _examine(dataset, search, split, tell, started, restricted=effects is not None)
@@ -137,11 +139,16 @@ def _examine(
     if first is None:
         why = "the robot as documented cannot be simulated under these trials' conditions"
         return _not_testable(dataset, split, experiment.sd_m, started, why)
+    first = search.coloured(first)
     tell(f"screening {len(search.candidates)} candidates")
-    null = search.examine(first)
+    null = search.noise_aware(search.examine(first))
     at_odds = contradicting(search, null) if null.detection.p_value < DETECTED else ()
     searched = null.detection.p_value < DETECTED and not at_odds
-    best, fitted = search.run(null) if searched else (null, [first])
+    best, fitted = search.run(null) if searched else (null, [null.hypothesis])
+    if search.experiment.noise != experiment.noise:
+        null = null if best is null else search.examine(search.again(null.hypothesis))
+        experiment = search.experiment
+    first = null.hypothesis
     selection = select(best.hypothesis, fitted, split)
     tell("opening the sealed trials")
     gap = open_seal(experiment, first.fit, best.hypothesis.fit, split.sealed, search.seed)

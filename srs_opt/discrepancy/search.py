@@ -8,15 +8,18 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from srs_opt.calibrate.candidates import Candidate
+from srs_opt.calibrate.colour import coloured
 from srs_opt.calibrate.coordinates import Coordinate
 from srs_opt.calibrate.experiment import Experiment, Point
 from srs_opt.calibrate.fit import FAR_OFF, PLAIN, Fit, start_point
+from srs_opt.calibrate.noise import Noise
 from srs_opt.calibrate.objective import priors, sum_eliminated
+from srs_opt.calibrate.slow import smooth_part
 from srs_opt.discrepancy.alike import Angles
-from srs_opt.discrepancy.detect import detect, project
+from srs_opt.discrepancy.detect import detect, project, with_shared
 from srs_opt.discrepancy.examined import TELLING, Examined, explained, needed_gain
 from srs_opt.discrepancy.functions import ResidualFunctions
-from srs_opt.discrepancy.hypothesis import ITERATIONS, SMALL, Hypothesis, fit_hypothesis
+from srs_opt.discrepancy.hypothesis import ITERATIONS, SMALL, Hypothesis, cost, fit_hypothesis, left_of, stuck
 from srs_opt.discrepancy.screen import Linearisation, Score, expected_start, screen
 from srs_opt.discrepancy.split import brief_name
 from srs_opt.errors import NoAnswerError
@@ -35,9 +38,6 @@ _MOST_REFITS = (5, 4, 3, 3)
 QUICK_ITERATIONS = 10  # with the first seconds of a few trials, before all are asked
 # shares of the misfit that fits which do not explain the data may leave to be gained: those, and all others
 ROUGHLY, NEARLY = 0.01, 0.001
-# share of the misfit that a second or later effect may leave and still count as progress: what is added is
-# the largest of what is missing, so that of three effects the third leaves no more
-LEFT = 0.5
 HOPELESS = 0.1  # share of the gap that the best known effects leave, from which on more data help nothing
 # of its typical size, from which a fit of what linearisation does not see begins; a fifth and the whole find
 # the same flexibility between 50 and 500 1/(N m^2), a tenth takes twice the iterations
@@ -47,6 +47,8 @@ FIRM = 10.0  # standard deviations from zero at which an effect is not superfluo
 # angle at which a member of a pair of look-alikes that is well behind in the screen is refitted all the same:
 # far from the linearisation's point an effect does up to sin^2 of it of something else
 KIN_RAD = 0.8
+# deviance behind the best, and number, of sets that are fitted again when the noise turns out another
+REFITTED, MOST_REFITTED = 60.0, 5
 Report = Callable[[str], None]
 
 
@@ -82,6 +84,7 @@ class Search:
         self.quick = tuple(quick) or self.trials
         self.deepest = DEEPEST
         self._fits: dict[tuple[frozenset[str], bool], Hypothesis] = {}
+        self._earlier: list[Hypothesis] = []  # under another noise
 
     @property
     def fitted(self) -> list[Hypothesis]:
@@ -149,6 +152,24 @@ class Search:
             start = first.fit.point
         return self.fit((), start, NULL_ITERATIONS, near=ROUGHLY)
 
+    def coloured(self, calibrated: Hypothesis) -> Hypothesis:
+        """Return calibration alone under the noise that its residuals show to be correlated in time."""
+        residuals = self.experiment.residuals(self.trials, calibrated.fit.point)
+        noise = coloured(self.experiment.noise, self.trials, residuals)
+        return calibrated if noise == self.experiment.noise else self._under(noise, calibrated)
+
+    def _under(self, noise: Noise, hypothesis: Hypothesis) -> Hypothesis:
+        """Go on under another noise; return a hypothesis fitted anew."""
+        self._report(f"noise: {noise.in_words}")
+        self._earlier += self.fitted
+        self.experiment = self.experiment.with_noise(noise)
+        self._fits = {}
+        return self.fit(hypothesis.candidates, hypothesis.fit.point) or hypothesis
+
+    def again(self, hypothesis: Hypothesis) -> Hypothesis:
+        """Return a hypothesis under the noise assumed by now."""
+        return self.fit(hypothesis.candidates, hypothesis.fit.point) or hypothesis
+
     def examine(self, hypothesis: Hypothesis) -> Examined:
         """Linearise about a fitted hypothesis, test what is left and screen what could explain it."""
         fit = hypothesis.fit
@@ -158,6 +179,9 @@ class Search:
         total = sum_eliminated(lin.grams, 1.0)
         precision, offset = priors(lin.coordinates[: lin.fitted], lin.point)
         score, covariance = project(total, range(lin.fitted), range(lin.fitted, columns), precision, offset)
+        shared = self.functions.repeated_sd(self.experiment.noise)
+        shared = np.append(np.zeros(size - lin.fitted), shared)
+        covariance = with_shared(covariance, shared)
         further = [[lin.column(c.name) - lin.fitted for c in k.sizes] for k in self.candidates]
         tested = [g for g in further if min(g) >= 0]
         start = size - lin.fitted
@@ -166,6 +190,23 @@ class Search:
         rng = np.random.default_rng([self.seed, 17])
         detection = detect(score, covariance, families, serial, rng)
         return Examined(hypothesis, lin, detection, groups, tuple(screen(lin, self.candidates)))
+
+    def noise_aware(self, examined: Examined) -> Examined:
+        """Return a hypothesis examined anew under smooth errors, if small ones explain what it leaves."""
+        now = self.experiment.noise
+        if examined.adequate or now.smooth or examined.linearisation.temper > FAR_OFF:
+            return examined
+        lin = examined.linearisation
+        amplitudes = self.functions.amplitudes(self.trials, len(lin.coordinates))
+        noise = smooth_part(now, lin.grams, amplitudes, lin.coordinates, lin.point)
+        return examined if noise == now else self.examine(self._under(noise, examined.hypothesis))
+
+    def _with_rivals(self) -> list[Hypothesis]:
+        """Return what was fitted, and the best that were fitted under another noise fitted anew."""
+        earlier = sorted((h for h in self._earlier if h.candidates), key=cost)[:MOST_REFITTED]
+        for h in [e for e in earlier if cost(e) < cost(earlier[0]) + REFITTED]:
+            self.again(h)
+        return self.fitted
 
     def _linearise(self, fit: Fit) -> Linearisation:
         names = {c.name for c in fit.coordinates}
@@ -192,10 +233,11 @@ class Search:
             if better is None or not self._worth(better, current.hypothesis):
                 break
             before, current = current, self._pruned(self.examine(self._polished(better)))
+            current = self.noise_aware(current)
             again = current.hypothesis.label == before.hypothesis.label
-            if again or self._settled(null, current) or _stuck(before.hypothesis, current.hypothesis):
+            if again or self._settled(null, current) or stuck(before.hypothesis, current.hypothesis):
                 break
-        return current, self.fitted
+        return current, self._with_rivals()
 
     def _begun(self, null: Examined) -> tuple[Examined, bool]:
         """Return what a search of the start of a few trials finds, fitted to all; whether that is the end.
@@ -212,22 +254,23 @@ class Search:
             return null, False
         start = brief.examine(first)
         best, fitted = brief.run(start)
-        self._fits |= {(names, True): h for (names, _), h in brief._fits.items()}
+        if brief.experiment.noise == self.experiment.noise:
+            self._fits |= {(names, True): h for (names, _), h in brief._fits.items()}
         near = [best.hypothesis]
         if brief._settled(start, best):  # else it has no rivals: it explains nothing yet
-            most, limit = len(best.hypothesis.candidates), _cost(best.hypothesis) + 2 * RIVAL
-            near = [h for h in fitted if 0 < len(h.candidates) <= most and _cost(h) < limit]
+            most, limit = len(best.hypothesis.candidates), cost(best.hypothesis) + 2 * RIVAL
+            near = [h for h in fitted if 0 < len(h.candidates) <= most and cost(h) < limit]
         better = self._best_of_whole(near) if best.hypothesis.candidates else None
         if better is None or not self._worth(better, null.hypothesis):
             return null, False
-        current = self._pruned(self.examine(self._polished(better)))
-        hopeless = _left(start.hypothesis, best.hypothesis) > HOPELESS
+        current = self.noise_aware(self._pruned(self.examine(self._polished(better))))
+        hopeless = left_of(start.hypothesis, best.hypothesis) > HOPELESS
         return current, hopeless or self._settled(null, current)
 
     def _best_of_whole(self, tried: Sequence[Hypothesis]) -> Hypothesis | None:
         """Return the best of some hypotheses when they are fitted to all trials."""
         whole = [self.fit(h.candidates, h.fit.point) for h in tried]
-        return min((h for h in whole if h is not None), key=_cost, default=None)
+        return min((h for h in whole if h is not None), key=cost, default=None)
 
     def _polished(self, hypothesis: Hypothesis) -> Hypothesis:
         """Return a hypothesis that explains the data with its fit carried on, where that had not ended."""
@@ -259,10 +302,10 @@ class Search:
             rival = current.hypothesis if best is None else best
             limit = self._tried_out(rival) + 2 * RIVAL
             tried = self.try_out(exchanged, start, limit)
-            if tried is None or _cost(tried) > limit:
+            if tried is None or cost(tried) > limit:
                 continue
             swapped = self.fit(exchanged, tried.fit.point, beat=rival.deviance)
-            if swapped is not None and (best is None or _cost(swapped) < _cost(best)):
+            if swapped is not None and (best is None or cost(swapped) < cost(best)):
                 best = swapped
         return best
 
@@ -270,7 +313,7 @@ class Search:
         """Return what the start of a few trials says against a hypothesis that was fitted to all."""
         key = frozenset(c.label for c in hypothesis.candidates), True
         tried = self._fits.get(key) or self.try_out(hypothesis.candidates, hypothesis.fit.point)
-        return math.inf if tried is None else _cost(tried)
+        return math.inf if tried is None else cost(tried)
 
     def _proposals(self, current: Examined, depth: int) -> list[Score]:
         """Return the candidates that deserve a refit, best first."""
@@ -312,8 +355,8 @@ class Search:
                 break
         if not found:
             return None
-        found.sort(key=_cost)
-        near = [h for h in found if _cost(h) < _cost(found[0]) + 2 * RIVAL]
+        found.sort(key=cost)
+        near = [h for h in found if cost(h) < cost(found[0]) + 2 * RIVAL]
         return self._best_of_whole(near)
 
     def _start(self, current: Examined, score: Score) -> Point:
@@ -355,18 +398,3 @@ class Search:
             if smaller is not None and smaller.deviance < beat:
                 return self._pruned(self.examine(smaller))
         return current
-
-
-def _stuck(before: Hypothesis, after: Hypothesis) -> bool:
-    """Whether piling up effects only nibbles at the misfit: what is missing is none of them."""
-    left = _left(before, after)
-    return len(after.candidates) > 1 and after.fit.misfit_ratio > 1.2 and left > LEFT
-
-
-def _left(before: Hypothesis, after: Hypothesis) -> float:
-    """Return the share of a misfit beyond the noise that is left."""
-    return (after.fit.misfit_ratio - 1) / max(before.fit.misfit_ratio - 1, 1e-9)
-
-
-def _cost(hypothesis: Hypothesis) -> float:
-    return hypothesis.deviance + 2 * hypothesis.parameters

@@ -12,7 +12,7 @@ import numpy as np
 from srs_opt.calibrate.candidates import fitted_coordinates
 from srs_opt.calibrate.experiment import Experiment, Point
 from srs_opt.calibrate.model import Model
-from srs_opt.calibrate.noise import noise_sd_m
+from srs_opt.calibrate.noise import noise_of
 from srs_opt.calibrate.usable import usable
 from srs_opt.errors import InputError, NoAnswerError
 from srs_opt.measurement.motion import Motion, trial_motion
@@ -80,7 +80,7 @@ def look(
             f"{dataset.robot.links}"
         )
     simulated = [t for t in dataset.trials if not usable(t)]
-    experiment = Experiment(Model(robot), simulated, noise_sd_m(dataset))
+    experiment = Experiment(Model(robot), simulated, noise_of(dataset))
     start = Point({c.name: 0.0 for c in fitted_coordinates(robot) if not c.effect})
     found = []
     for trial in dataset.trials:

@@ -11,6 +11,7 @@ from srs_opt.calibrate.experiment import Point
 from srs_opt.calibrate.fit import CONVERGED, fit
 from srs_opt.calibrate.gram import trial_gram
 from srs_opt.calibrate.objective import AHEAD, MOST_SCATTER, bent_move, best_move, objective, within_reach
+from srs_opt.calibrate.whiten import Whitening
 
 TRUTH = np.array([0.4, 1.2])
 COORDINATES = (Coordinate("size.of_it", "size"), Coordinate("width.of_it", "width"))
@@ -38,7 +39,14 @@ class Curved:
             ends = [(self.values(x + s) - self.values(x - s)) / 2e-6 for s in steps]
             self.slopes = np.column_stack(ends)
         none = np.zeros(0)
-        gram = trial_gram(self.measured - self.values(x), self.slopes, 0.01, (), none, none)
+        gram = trial_gram(
+            self.measured - self.values(x),
+            self.slopes,
+            Whitening.of_white(0.01, self.measured),
+            (),
+            none,
+            none,
+        )
         return {"all": replace(gram, stale=stale)}
 
 
@@ -68,7 +76,7 @@ def test_a_step_with_scatter_at_its_limits_is_that_of_a_general_solver(seed):
         residual = slopes @ [0.5, -0.4] + (0.8, -0.9, 0.02)[k] * slopes[:, 0]  # more scatter than is allowed
         residual += 0.1 * rng.standard_normal(40)
         now = np.array([0.05 * (k - 1)])
-        trials[name] = trial_gram(residual, slopes, 0.1, (0,), sd, now)
+        trials[name] = trial_gram(residual, slopes, Whitening.of_white(0.1, residual), (0,), sd, now)
         own = np.zeros((40, 3))
         own[:, k] = slopes[:, 0]
         rows.append(np.column_stack([slopes, own]) / 0.1)

@@ -1,34 +1,84 @@
 """Noise of the camera: the white part from the tracks, the correlated part as the data set states it."""
 
-import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import yaml
 
-from srs_opt.calibrate.noise import noise_sd_m
+from srs_opt.calibrate.gram import trial_gram
+from srs_opt.calibrate.noise import Noise, noise_of
+from srs_opt.calibrate.whiten import Whitening
 from srs_opt.errors import InputError
 from srs_opt.measurement.dataset import load_dataset, write_dataset
-from srs_opt.measurement.records import DataSet, MapRow
+from srs_opt.measurement.records import DataSet, MapRow, Trial
 from srs_opt.robot import wpi_srs
 
 CAMERA = {"rate_hz": 100.0, "marker_sd_m": 0.001}
 
 
-def test_correlated_noise_counts_as_it_moves_a_mean():
-    # of n independent coordinates' means over T, correlated noise against white noise of the assumed size
-    sd, tau, rate, samples, runs = 0.0004, 0.2, 100.0, 3000, 2000
-    rng = np.random.default_rng(1)
-    keep = math.exp(-1 / (rate * tau))
-    walk, total = sd * rng.standard_normal(runs), np.zeros(runs)
-    for _ in range(samples):
-        walk = keep * walk + sd * math.sqrt(1 - keep**2) * rng.standard_normal(runs)
-        total += walk
-    dataset = DataSet("", wpi_srs(), rate, 1e-12, correlated_sd_m=sd, correlation_s=tau)
-    assert noise_sd_m(dataset) / math.sqrt(samples) == pytest.approx(np.std(total / samples), rel=0.06)
-    both = replace(dataset, marker_sd_m=0.003)
-    assert noise_sd_m(both) == pytest.approx(math.hypot(0.003, noise_sd_m(dataset)), rel=1e-9)
+TIME_S = np.cumsum(np.random.default_rng(4).uniform(0.005, 0.02, 40))
+
+
+def gappy(seed=0, coordinates=3):
+    """Return values (T, C) with holes of their own in every coordinate."""
+    rng = np.random.default_rng(seed)
+    values = rng.standard_normal((TIME_S.size, coordinates))
+    values[rng.random(values.shape) < 0.3] = np.nan
+    return values
+
+
+def covariance_of(noise, seen):
+    """Return the covariance of the values that were seen, in the order of their rows."""
+    frame, channel = np.nonzero(seen)
+    same = channel[:, None] == channel
+    lag = np.abs(TIME_S[frame][:, None] - TIME_S[frame])
+    walk = noise.correlated_sd_m**2 * np.exp(-lag / noise.correlation_s) * same
+    return walk + noise.white_sd_m**2 * np.eye(frame.size)
+
+
+def test_whitening_is_what_the_covariance_says_whatever_frames_are_missing():
+    noise, values = Noise(0.7, 0.4, 0.05), gappy()
+    seen = np.isfinite(values)
+    columns = np.column_stack(
+        [np.nan_to_num(values).ravel(), np.random.default_rng(1).random((values.size, 4))]
+    )
+    whiten = Whitening(noise, TIME_S, seen)
+    weight = np.linalg.inv(covariance_of(noise, seen))
+    kept = columns[seen.ravel()]
+    white = whiten(columns)
+    assert white.T @ white == pytest.approx(kept.T @ weight @ kept, rel=1e-9)
+    assert whiten.log_det == pytest.approx(-np.linalg.slogdet(weight)[1], rel=1e-9)
+    assert np.array_equal(np.isfinite(whiten.in_place(white[:, 0])), seen)
+
+
+def test_what_is_a_trials_own_is_integrated_out():
+    noise, values = Noise(0.7, 0.4, 0.05), gappy()
+    seen, rng = np.isfinite(values), np.random.default_rng(2)
+    slopes, own, own_sd = rng.random((values.size, 3)), rng.random((values.size, 2)), np.array([0.5, 2.0])
+    whiten, none = Whitening(noise, TIME_S, seen), np.zeros(0)
+    gram = trial_gram(values.ravel(), slopes, whiten, (), none, none, own, own_sd)
+    rows = seen.ravel()
+    part = own[rows] * own_sd
+    weight = np.linalg.inv(covariance_of(noise, seen) + part @ part.T)
+    both = np.column_stack([slopes, values.ravel()])[rows]
+    assert gram.raw == pytest.approx(both.T @ weight @ both, rel=1e-8)
+    assert gram.count == rows.sum()
+
+
+def test_white_noise_is_found_below_a_motion():
+    dataset = recorded(np.random.default_rng(5), sd=0.001)
+    assert noise_of(dataset).white_sd_m == pytest.approx(0.001, rel=0.05)
+    known = replace(dataset, correlated_sd_m=0.0004, correlation_s=0.2)
+    assert noise_of(known) == replace(noise_of(dataset), correlated_sd_m=0.0004, correlation_s=0.2)
+
+
+def recorded(rng, sd):
+    """Return a set with one trial of a marker on a circle."""
+    time = np.arange(2000) / 100
+    track = 0.1 * np.column_stack([np.cos(9 * time), np.sin(9 * time)]) + sd * rng.standard_normal((2000, 2))
+    trial = Trial("t", 1.0, 48.0, 0.0, 1.57, 0.0, 20.0, time, centre_m=track)
+    return DataSet("", wpi_srs(), 100.0, 0.003, trials=(trial,))
 
 
 @pytest.mark.parametrize(

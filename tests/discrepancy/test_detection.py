@@ -3,6 +3,7 @@
 import numpy as np
 
 from srs_opt.calibrate.gram import trial_gram
+from srs_opt.calibrate.whiten import Whitening
 from srs_opt.discrepancy.detect import detect, project
 
 GROUPS = ((0, 1), (2, 3, 4), (5,), (1, 5))
@@ -21,7 +22,9 @@ def one(seed, gap=0.0):
         own[0] += scatter_sd[0] * rng.standard_normal()
         own[5] += gap
         residual = slopes @ own + sd * rng.standard_normal(60)
-        total = total + trial_gram(residual, slopes, sd, (0,), scatter_sd, np.zeros(1)).eliminated().matrix
+        whiten = Whitening.of_white(sd, residual)
+        gram = trial_gram(residual, slopes, whiten, (0,), scatter_sd, np.zeros(1))
+        total = total + gram.eliminated().matrix
     score, covariance = project(total, range(3), range(3, 9), np.full(3, 25.0), np.zeros(3))
     return detect(score, covariance, GROUPS, np.zeros(10), np.random.default_rng(seed)).p_value
 

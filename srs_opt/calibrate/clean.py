@@ -1,0 +1,150 @@
+"""Positions that are no noise: labels that were exchanged are put right, what lies far off is left out.
+
+Both are judged by the tracks alone, not by a model's residuals: what a model cannot explain stays.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from srs_opt.calibrate.noise import track_of
+from srs_opt.measurement.chain import chain_of
+from srs_opt.measurement.labels import mend_labels
+from srs_opt.measurement.records import Array, DataSet, Trial
+from srs_opt.robot import Robot
+
+REACH_S = 0.034  # to either side of a frame, over which a motion is a parabola
+FEWEST, MOST = 2, 5  # frames to either side
+# robust deviations of a position from the parabola through its neighbours beyond which it is left out: by
+# chance one in a million. Half as many would leave out one good position in a hundred and bias the noise.
+FAR = 5.0
+PASSES = 12  # a marker that is elsewhere for several frames spoils its neighbours' parabolas
+_MAD = 0.674489750196
+
+
+@dataclass(frozen=True)
+class Mended:
+    """What was done to the tracks of a data set.
+
+    Attributes
+    ----------
+    dataset : DataSet
+    outliers, swapped : dict
+        Trial -> positions left out, frames whose labels were put right; trials without are not in it.
+    seen : int
+        Positions before.
+    """
+
+    dataset: DataSet
+    outliers: dict[str, int]
+    swapped: dict[str, int]
+    seen: int
+
+    @property
+    def outlier_share(self) -> float:
+        """Share of all positions that was left out."""
+        return sum(self.outliers.values()) / max(self.seen, 1)
+
+
+def mended(dataset: DataSet) -> Mended:
+    """Return the data set with exchanged labels put right and outliers taken for lost."""
+    trials, outliers, swapped, seen = [], {}, {}, 0
+    for trial in dataset.trials:
+        track = track_of(trial)
+        if track is None:
+            trials.append(trial)
+            continue
+        trial, count = _relabelled(dataset.robot, trial)
+        if count:
+            swapped[trial.name] = count
+        points = track.reshape(len(track), -1, 2) if trial.markers_m is None else trial.markers_m
+        seen += int(np.isfinite(points[..., 0]).sum())
+        wild = outliers_of(points, trial.time_s)
+        if wild.any():
+            outliers[trial.name] = int(wild.sum())
+            points = np.where(wild[..., None], np.nan, points)
+            trial = _with_points(trial, points)
+        trials.append(trial)
+    return Mended(replace(dataset, trials=tuple(trials)), outliers, swapped, seen)
+
+
+def _relabelled(robot: Robot, trial: Trial) -> tuple[Trial, int]:
+    if trial.markers_m is None or trial.markers_m.shape[1] < 2:
+        return trial, 0
+    chain = chain_of(robot, trial.spots)
+    if trial.markers_m.shape[1] != chain.markers:
+        return trial, 0
+    found = mend_labels(chain, trial.markers_m)
+    count = int(found.swapped.sum())
+    return (replace(trial, markers_m=found.markers_m), count) if count else (trial, 0)
+
+
+def _with_points(trial: Trial, points: Array) -> Trial:
+    if trial.markers_m is not None:
+        return replace(trial, markers_m=points)
+    return replace(trial, centre_m=points[:, 0])
+
+
+def outliers_of(points: Array, time_s: Array) -> np.ndarray:
+    """Return which positions (T, M, 2) lie far from the parabola through those just before and after, (T, M).
+
+    The farthest of its neighbourhood is left out first, then the parabolas are drawn anew.
+    """
+    frames, markers = points.shape[:2]
+    wild = np.zeros((frames, markers), dtype=bool)
+    if frames < 4 * FEWEST:
+        return wild
+    frame_s = float(np.median(np.diff(time_s)))
+    reach = int(np.clip(round(REACH_S / frame_s), FEWEST, MOST)) if frame_s > 0 else FEWEST
+    scale = None
+    for _ in range(PASSES):
+        off, sure = _off_parabola(np.where(wild[..., None], np.nan, points), reach)
+        if scale is None:
+            if not sure.any():
+                break
+            scale = np.median(np.abs(off[sure])) / _MAD
+        size = np.where(sure, np.max(np.abs(off), axis=2), 0.0)
+        farthest = size >= _largest_nearby(size, reach)
+        found = farthest & (size > FAR * scale)
+        if not found.any():
+            break
+        wild |= found
+    return wild
+
+
+def _largest_nearby(size: Array, reach: int) -> Array:
+    from scipy.ndimage import maximum_filter1d
+
+    return np.asarray(maximum_filter1d(size, 2 * reach + 1, axis=0, mode="constant"))
+
+
+def _off_parabola(points: Array, reach: int) -> tuple[Array, np.ndarray]:
+    """Return standardised distances (T, M, 2) from the neighbours' parabola, and where there is one (T, M).
+
+    Least squares over the seen frames within reach, the point's own left out.
+    """
+    from scipy.ndimage import correlate1d
+
+    seen = np.isfinite(points[..., 0])
+    weight, value = seen.astype(float), np.where(seen[..., None], points, 0.0)
+    lag = np.arange(-reach, reach + 1) / reach
+    others = (lag != 0).astype(float)
+
+    def summed(data: Array, power: int) -> Array:
+        return np.asarray(correlate1d(data, others * lag**power, axis=0, mode="constant"))
+
+    moments = [summed(weight, k) for k in range(5)]
+    normal = np.stack([np.stack([moments[i + j] for j in range(3)], axis=-1) for i in range(3)], axis=-2)
+    count = moments[0]
+    both_sides = (correlate1d(weight, (lag < 0) * 1.0, axis=0, mode="constant") >= 1) & (
+        correlate1d(weight, (lag > 0) * 1.0, axis=0, mode="constant") >= 1
+    )
+    sure = seen & both_sides & (count >= 4)
+    normal[~sure] = np.eye(3)
+    inverse = np.linalg.inv(normal)
+    right = np.stack([summed(value, k) for k in range(3)], axis=-1)
+    expected = np.einsum("tmk,tmck->tmc", inverse[..., 0, :], right)
+    spread = np.sqrt(1 + np.maximum(inverse[..., 0, 0], 0.0))
+    return np.where(sure[..., None], (value - expected) / spread[..., None], 0.0), sure
