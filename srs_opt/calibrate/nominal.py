@@ -28,6 +28,7 @@ TOLERANCE_M_S = 5e-6
 FINEST_M_S = 2e-7
 ACCEPTED = 15.0  # single steps may be worse: friction forgets an error of speed within milliseconds
 ATTEMPTS = 12  # of refining a cycle's mesh; four left a trial a millimetre off where friction is sharpest
+WASTEFUL = 0.3  # share of its steps that would do, below which a mesh is made anew
 _TAIL_S = 0.05  # simulated beyond the last label, for clocks that run late
 # (tolerance, cycle) -> what the valves did, and the mesh that served
 Meshes = dict[tuple[float, int], tuple[tuple[float, ...], Mesh]]
@@ -201,7 +202,10 @@ class TrialRun:
         for attempt in range(attempts):
             got = yield Stretch(kernel, x, mesh, piece.valve, p)
             _check(got)
-            if got.error_m_s.max() <= ACCEPTED * tolerance or attempt == attempts - 1:
+            fine = got.error_m_s.max() <= ACCEPTED * tolerance
+            # a mesh from where the motion nearly broke down would slow all that follow
+            wasteful = fine and mesh.wanted(got.error_m_s, tolerance) < WASTEFUL * mesh.h_s.size
+            if (fine and not wasteful) or attempt == attempts - 1:
                 break
             mesh = mesh.refined(got.error_m_s, tolerance)
         self.meshes[key] = (phases, mesh)

@@ -43,6 +43,10 @@ class Mesh:
         phase = self.phase[None, :] + phases * np.arange(times)[:, None]
         return Mesh(np.tile(self.h_s, times), phase.ravel())
 
+    def wanted(self, error: np.ndarray, tolerance: float) -> float:
+        """Return how many steps `refined` would make, about."""
+        return float(_density(error, tolerance).sum())
+
     def refined(self, error: np.ndarray, tolerance: float) -> Mesh:
         """Return a mesh whose steps should all make the same error `tolerance`.
 
@@ -53,8 +57,7 @@ class Mesh:
         NoAnswerError
             If that takes more steps than any motion of a real robot does.
         """
-        density = np.clip((np.maximum(error, 1e-30) / tolerance) ** (1 / ORDER), 0.25, 4.0)
-        density = _smoothed(density)
+        density = _density(error, tolerance)
         phases, first = np.unique(self.phase, return_index=True)
         totals = np.add.reduceat(density, first)
         counts = np.maximum(np.ceil(totals).astype(int), 2)
@@ -73,6 +76,11 @@ class Mesh:
         edges = np.concatenate([[0], np.cumsum(counts)])
         nodes[edges] = times[[*first, error.size]]
         return Mesh(np.diff(nodes), np.repeat(phases, counts))
+
+
+def _density(error: np.ndarray, tolerance: float) -> np.ndarray:
+    """Return by how many new steps each old one is to be replaced."""
+    return _smoothed(np.clip((np.maximum(error, 1e-30) / tolerance) ** (1 / ORDER), 0.25, 4.0))
 
 
 def _smoothed(density: np.ndarray) -> np.ndarray:
