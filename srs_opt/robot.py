@@ -159,9 +159,9 @@ class Robot:
 
 
 def _bending(effects: tuple[EffectSpec, ...]) -> bool:
-    from srs_opt.model.effects import all_effects
+    from srs_opt.model.effects import known_effects
 
-    known = all_effects()
+    known = known_effects()
     return any(known[e["name"]].bends and e[known[e["name"]].size.name] != 0 for e in effects)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from srs_opt.model.effects import all_effects
+from srs_opt.model.effects import known_effects
 from srs_opt.robot import Robot
 
 
@@ -15,7 +15,7 @@ def with_friction_times(robot: Robot, along: float, across: float) -> Robot:
 
 def undelayed(robot: Robot) -> Robot:
     """Return the robot with valves that follow at once; a constant delay only shifts a plan in time."""
-    effects = [dict(spec) for spec in robot.effects if all_effects()[spec["name"]].delay is None]
+    effects = [dict(spec) for spec in robot.effects if known_effects()[spec["name"]].delay is None]
     if robot.valve_delay_s == 0 and len(effects) == len(robot.effects):
         return robot
     return robot.with_values(valve_delay_s=0.0, effects=effects)

@@ -171,7 +171,7 @@ def forms_of(effect: Effect, links: int) -> tuple[Form, ...]:
 
 def form_of_entry(entry: Mapping[str, Any]) -> Form:
     """Return the form of a robot file's entry."""
-    from srs_opt.model.effects import all_effects
+    from srs_opt.model.effects import known_effects
 
-    effect = all_effects()[entry["name"]]
+    effect = known_effects()[entry["name"]]
     return Form(effect, int(entry[effect.place.name]) if effect.place else None)

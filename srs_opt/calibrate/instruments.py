@@ -12,10 +12,10 @@ import numpy as np
 
 from srs_opt.calibrate.coordinates import SCATTER_SD, Coordinate
 from srs_opt.calibrate.gram import TrialGram
-from srs_opt.calibrate.model import Conditions, Model, Values, camera_effects
+from srs_opt.calibrate.model import Conditions, Model, Values
 from srs_opt.measurement.records import Bench, Check, TowTest
 from srs_opt.model.compliant import CompliantModel
-from srs_opt.model.effects import all_effects
+from srs_opt.model.effects import known_effects
 from srs_opt.model.effects.effect import LinkState
 from srs_opt.model.mechanics import Mechanics
 from srs_opt.model.parameters import Structure, effect_symbols
@@ -37,7 +37,7 @@ class Reading:
 def check_expectations(model: Model) -> Mapping[str, Callable[[Values], float]]:
     """Return what each known check should read, by its quantity: asked of the effects' own hooks."""
     still = Conditions(0.0, 1.0)
-    function = _instrument_readings(model.full)
+    function = _instrument_readings(model.full, model.camera)
 
     def reads(quantity: str) -> Callable[[Values], float]:
         k = QUANTITIES.index(quantity)
@@ -63,7 +63,7 @@ QUANTITIES = (
 
 
 @lru_cache(maxsize=8)
-def _instrument_readings(structure: Structure) -> ca.Function:
+def _instrument_readings(structure: Structure, seen: tuple[str, ...]) -> ca.Function:
     """Return ``(p, camera, clock_s) -> (QUANTITIES)`` for the straight robot at rest.
 
     Scales under the tail's and the head's wheels; a short ruler across at x = 0 and 1 m, measured over true
@@ -72,11 +72,12 @@ def _instrument_readings(structure: Structure) -> ca.Function:
     parameters, m, _ = build(structure)
     clock = ca.SX.sym("clock")
     weight = m.normal_force()
-    own = {e.name: effect_symbols(e, structure.links) for e in camera_effects()}
+    effects = [known_effects()[name] for name in seen]
+    own = {e.name: effect_symbols(e, structure.links) for e in effects}
     camera = ca.vertcat(*(v for symbols in own.values() for v in symbols.values()))
     x, y = ca.SX.sym("x"), ca.SX.sym("y")
     seen_x, seen_y = x, y
-    for effect in camera_effects():
+    for effect in effects:
         if effect.camera:
             seen_x, seen_y = effect.camera(own[effect.name], seen_x, seen_y)
     across = ca.Function("across", [x, y, camera], [ca.jacobian(seen_y, y)])
@@ -98,7 +99,8 @@ def _resting(m: Mechanics) -> LinkState:
     """Return the links at the room's origin, at rest."""
     zero, p = ca.SX.zeros(m.links, 1), m.parameters
     speed = p["friction_speed_m_s"]
-    return LinkState(zero, zero, ca.SX(0), zero, zero, m.mass, p["gravity_m_s2"], speed)
+    pose = zero, zero, ca.SX(0), zero, zero, m.mass, p["gravity_m_s2"], speed
+    return LinkState(*pose, ca.SX.ones(m.links, 1), zero, zero, zero, zero)
 
 
 def readings(model: Model, bench: Bench) -> tuple[Reading, ...]:
@@ -128,7 +130,7 @@ def _tow(model: Model, test: TowTest) -> Reading:
 
 
 def _of_the_floor() -> set[str]:
-    return {name for name, e in all_effects().items() if e.knows_the_room and not e.of_tether}
+    return {name for name, e in known_effects().items() if e.knows_the_room and not e.of_tether}
 
 
 @lru_cache(maxsize=8)

@@ -19,7 +19,7 @@ from srs_opt.calibrate.result import Calibration, calibration
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Wave
 from srs_opt.measurement.records import DataSet, MapRow, Trial
-from srs_opt.model.effects import all_effects
+from srs_opt.model.effects import known_effects
 from srs_opt.orbit.sensitivity import sensitivity
 from srs_opt.orbit.steady import Orbit, integrator, steady_gaits
 from srs_opt.robot import Robot
@@ -171,7 +171,7 @@ def _effects_seen(robot: Robot, report: Callable[[str], None] | None) -> list[Co
     """Return the free parts of the robot's effects that steady gaits show; tell of those that they do not."""
     seen: list[Coordinate] = []
     for entry in robot.effects:
-        effect, free = all_effects()[entry["name"]], form_of_entry(entry).refitted(entry)
+        effect, free = known_effects()[entry["name"]], form_of_entry(entry).refitted(entry)
         if effect.in_equations and not effect.knows_the_room:
             seen += free
         elif report:

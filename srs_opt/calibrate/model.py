@@ -15,8 +15,8 @@ import numpy as np
 
 from srs_opt.calibrate.coordinates import Coordinate
 from srs_opt.calibrate.forms import Form, form_of_entry, forms_of
-from srs_opt.model.effects import all_effects
-from srs_opt.model.effects.effect import Effect
+from srs_opt.model.effects import all_effects, generic_effects, known_effects
+from srs_opt.model.effects.effect import OUTSIDE, Effect
 from srs_opt.model.parameters import COMPLIANCE_PARAMETERS, Structure, effect_symbols
 from srs_opt.model.registry import build
 from srs_opt.robot import Robot
@@ -53,14 +53,15 @@ class Packed:
         Parameters of the full structure.
     camera : array (C,)
         Parameters of the effects that change where points are seen.
-    delay_s, clock_s : array (1,)
-        Of the valves, beyond the robot's own; the sample labelled t was taken at t + clock.
+    delay_s, clock_s, clock_rate : array (1,)
+        Of the valves, beyond the robot's own; the sample labelled t was taken at t (1 + rate) + clock.
     """
 
     p: np.ndarray
     camera: np.ndarray
     delay_s: np.ndarray
     clock_s: np.ndarray
+    clock_rate: np.ndarray
 
 
 class Model:
@@ -77,6 +78,15 @@ class Model:
         nothing else is asked.
     model : {"complex", "simplified", "compliant"}, optional
         Default: what the robot file asks for. Under a rigid one a stiffness of the robot does not count.
+    generic : bool
+        Whether effects are those of the grammar (`srs_opt.model.effects.generic`), not the listed ones.
+
+    Attributes
+    ----------
+    camera : tuple of str
+        The effects that change where points are seen: those of the markers before the camera's.
+    clock_drifts : bool
+        Whether an effect makes the camera's clock run fast or slow.
 
     Raises
     ------
@@ -84,13 +94,19 @@ class Model:
         If the compliant model is asked for a robot without a stiffness.
     """
 
-    def __init__(self, robot: Robot, model: str | None = None) -> None:
-        self.robot, self.name = robot, model or robot.own_model
+    def __init__(self, robot: Robot, model: str | None = None, *, generic: bool = False) -> None:
+        self.robot, self.name, self.generic = robot, model or robot.own_model, generic
         if self.name == "compliant":
             Structure.of(robot, self.name)
         self._bends = self.name == "compliant" and robot.has_stiffness
         rigid, links = "complex" if self.name == "compliant" else self.name, robot.links
-        effects = tuple(all_effects().values())
+        listed = generic_effects() if generic else all_effects()
+        present = [known_effects()[str(e["name"])] for e in robot.effects]
+        effects = (*listed.values(), *(e for e in dict.fromkeys(present) if e.name not in listed))
+        self.camera = tuple(
+            e.name for e in sorted(effects, key=lambda e: e.marker is None) if e.seen_by_camera
+        )
+        self.clock_drifts = any(e.clock_rate for e in effects)
         linear = tuple(e for e in effects if not e.nonlinear_actuator)
         groups = [_occurrences(group) for group in ((), linear, effects)]
         self.rigid, self.soft = (
@@ -174,29 +190,24 @@ class Model:
 
     @cached_property
     def _packing(self) -> Buffered:
-        return Buffered(_functions(self.full, self.forms, self._names)[0])
+        return Buffered(_functions(self.full, self.forms, self._names, self.camera)[0])
 
     @cached_property
     def _slopes(self) -> Buffered:
-        return Buffered(_functions(self.full, self.forms, self._names)[1])
+        return Buffered(_functions(self.full, self.forms, self._names, self.camera)[1])
 
     def __getstate__(self) -> dict[str, object]:  # buffers do not travel
         return {k: v for k, v in self.__dict__.items() if k not in ("_packing", "_slopes")}
 
 
 def _in_compiled_equations(effect: Effect) -> bool:
-    return effect.in_equations and not effect.hooks <= {*_FOLDED, "delay", "marker", "camera", "clock"}
+    folded = effect.hooks <= {*_FOLDED, *OUTSIDE} and effect.place is None
+    return effect.in_equations and not folded
 
 
 def _occurrences(effects: Sequence[Effect]) -> tuple[str, ...]:
     """Return the names of the effects that the equations must hold, as often as they stand there."""
     return tuple(e.name for e in effects if _in_compiled_equations(e) for _ in range(Form(e).copies))
-
-
-def camera_effects() -> tuple[Effect, ...]:
-    """Return the effects that change where points are seen: those of the markers before the camera's."""
-    seen = [e for e in all_effects().values() if e.seen_by_camera]
-    return tuple(sorted(seen, key=lambda e: e.marker is None))
 
 
 def _layout(structure: Structure, full: Structure) -> tuple[str, ...]:
@@ -214,9 +225,9 @@ def _layout(structure: Structure, full: Structure) -> tuple[str, ...]:
 
 @lru_cache(maxsize=8)
 def _functions(
-    full: Structure, forms: tuple[Form, ...], names: tuple[str, ...]
+    full: Structure, forms: tuple[Form, ...], names: tuple[str, ...], seen: tuple[str, ...]
 ) -> tuple[ca.Function, ca.Function]:
-    """Return ``(coordinates, bench, conditions) -> (p, camera, delay, clock)``, and the Jacobian of each."""
+    """Return ``(coordinates, bench, conditions) -> (p, camera, delay, clock, rate)``, and the Jacobian of each."""
     z, now = ca.SX.sym("z", len(names)), ca.SX.sym("now", len(_CONDITIONS))
     values = {name: z[k] for k, name in enumerate(names)}
     robot_names = [n for n in names if "." not in n]
@@ -225,8 +236,8 @@ def _functions(
     robot |= {"pressure_kpa": now[0], "frequency_hz": now[1]}
     own = {e.name: [_over_places(e, forms, values, now[2], c) for c in range(Form(e).copies)]
            for e in dict.fromkeys(f.effect for f in forms)}  # fmt: skip
-    known = all_effects()
-    delay, clock = ca.SX(0), ca.SX(0)
+    known = known_effects()
+    delay, clock, rate = ca.SX(0), ca.SX(0), ca.SX(0)
     for name, copies in own.items():
         effect, e = known[name], copies[0]
         if not _in_compiled_equations(effect):
@@ -242,11 +253,12 @@ def _functions(
                 robot[_FOLDED["relaxation"]] = ca.if_else(own_time > 0, own_time, effect.relaxation(e))
         delay = delay + effect.delay(e) if effect.delay else delay
         clock = clock + effect.clock(e) if effect.clock else clock
+        rate = rate + effect.clock_rate(e) if effect.clock_rate else rate
     p = [robot[n] for n in full.parameter_names]
     for k, name in enumerate(full.effects):
         p += list(own[name][k - full.effects.index(name)].values())
-    camera = [v for e in camera_effects() for v in own[e.name][0].values()]
-    outputs = [ca.vertcat(*p), ca.vertcat(*camera), delay, clock]
+    camera = [v for name in seen for v in own[name][0].values()]
+    outputs = [ca.vertcat(*p), ca.vertcat(*camera), delay, clock, rate]
     inputs = [z, bench, now]
     slopes = [ca.densify(ca.jacobian(o, z)) for o in outputs]
     options = {"cse": True}
@@ -264,4 +276,4 @@ def _over_places(
     return found
 
 
-__all__ = ["Conditions", "Model", "Packed", "Values", "camera_effects"]
+__all__ = ["Conditions", "Model", "Packed", "Values"]

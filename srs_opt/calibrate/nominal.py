@@ -30,6 +30,7 @@ ACCEPTED = 15.0  # single steps may be worse: friction forgets an error of speed
 ATTEMPTS = 12  # of refining a cycle's mesh; four left a trial a millimetre off where friction is sharpest
 WASTEFUL = 0.3  # share of its steps that would do, below which a mesh is made anew
 _TAIL_S = 0.05  # simulated beyond the last label, for clocks that run late
+_FASTEST_CLOCK = 0.03  # times as long beyond it where clocks may run fast
 # (tolerance, cycle) -> what the valves did, and the mesh that served
 Meshes = dict[tuple[float, int], tuple[tuple[float, ...], Mesh]]
 
@@ -51,8 +52,8 @@ class Nodes:
         Held over each step.
     p, camera : array
         Packed parameters of the full structure, and of what the camera sees.
-    clock_s : float
-        The sample labelled t was taken at t + clock_s.
+    clock_s, clock_rate : float
+        The sample labelled t was taken at t (1 + clock_rate) + clock_s.
     """
 
     time_s: np.ndarray
@@ -66,6 +67,7 @@ class Nodes:
     p: np.ndarray
     camera: np.ndarray
     clock_s: float
+    clock_rate: float = 0.0
 
     def shape(self, layout: StateLayout) -> np.ndarray:
         """Return the body's shape (n + 1, ...) as `layout` has it."""
@@ -85,9 +87,9 @@ def tolerance_for(values: int, sd_m: float) -> float:
     return min(TOLERANCE_M_S, max(FINEST_M_S, needed))
 
 
-def timeline_of(trial: Trial, segments: int) -> Timeline:
+def timeline_of(trial: Trial, segments: int, fastest_clock: float = 0.0) -> Timeline:
     """Return what the valves do in a trial, a little longer than it was recorded."""
-    end = float(trial.time_s[-1]) + _TAIL_S
+    end = float(trial.time_s[-1]) * (1 + fastest_clock) + _TAIL_S
     if trial.kind == "still":
         return Timeline.vent(segments, end, trial.pressure_kpa)
     if trial.applied is not None:
@@ -139,7 +141,8 @@ class TrialRun:
     def __init__(self, model: Model, trial: Trial) -> None:
         self.model, self.trial = model, trial
         self.conditions = conditions_of(trial)
-        self.timeline = timeline_of(trial, model.segments)
+        fastest = _FASTEST_CLOCK if model.clock_drifts else 0.0
+        self.timeline = timeline_of(trial, model.segments, fastest)
         self.meshes: Meshes = {}
 
     def __call__(self, values: Values, tolerance_m_s: float = TOLERANCE_M_S) -> Nodes:
@@ -262,6 +265,7 @@ def _nodes(
         p=packed.p,
         camera=packed.camera,
         clock_s=float(packed.clock_s[0]),
+        clock_rate=float(packed.clock_rate[0]),
     )
 
 

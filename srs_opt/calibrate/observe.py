@@ -11,11 +11,13 @@ import numpy as np
 
 from srs_opt.calibrate.coordinates import Coordinate
 from srs_opt.calibrate.mapped import evaluate, mapped
-from srs_opt.calibrate.model import Model, Values, camera_effects
+from srs_opt.calibrate.model import Model, Values
 from srs_opt.calibrate.nominal import Nodes, conditions_of
 from srs_opt.calibrate.sensitivity import Variation, onset, variation
 from srs_opt.measurement.records import Trial
 from srs_opt.measurement.spots import Spots
+from srs_opt.model.effects import known_effects
+from srs_opt.model.effects.effect import Effect
 from srs_opt.model.kinematics import Chain, arc
 from srs_opt.model.mechanics import Mechanics
 from srs_opt.model.parameters import Structure, effect_symbols
@@ -51,19 +53,22 @@ class Prediction:
 
 
 @lru_cache(maxsize=8)
-def _picture(structure: Structure, centre_only: bool, spots: Spots | None) -> ca.Function:
+def _picture(
+    structure: Structure, centre_only: bool, spots: Spots | None, seen: tuple[str, ...]
+) -> ca.Function:
     """Return ``(pose, shape, camera, p) -> (points, by pose, by shape, by camera, by p)``, mapped."""
 
     def make() -> ca.Function:
         parameters, m, _ = build(structure)
         pose = ca.SX.sym("pose", 3)
-        values = {e.name: effect_symbols(e, structure.links) for e in camera_effects()}
+        effects = [known_effects()[name] for name in seen]
+        values = {e.name: effect_symbols(e, structure.links) for e in effects}
         camera = ca.vertcat(*(v for own in values.values() for v in own.values()))
         c, s = ca.cos(pose[2]), ca.sin(pose[2])
         body = _body_points(m, spots)
         x = pose[0] + c * body.x - s * body.y
         y = pose[1] + s * body.x + c * body.y
-        x, y = _seen(x, y, pose[2] + body.angle, values, m.mass if centre_only else None)
+        x, y = _seen(x, y, pose[2] + body.angle, effects, values, m.mass if centre_only else None)
         points = ca.vec(ca.horzcat(x, y).T)
         p = parameters.vector
         by = [ca.densify(ca.jacobian(points, v)) for v in (pose, m.shape, camera, p)]
@@ -71,8 +76,7 @@ def _picture(structure: Structure, centre_only: bool, spots: Spots | None) -> ca
         single = ca.Function("picture", [pose, m.shape, camera, p], outputs, {"cse": True})
         return mapped(single, (2, 3))
 
-    seen = " ".join(e.name for e in camera_effects())
-    return compiled(f"picture {centre_only} {spots or ''} {structure} {seen}", make)
+    return compiled(f"picture {centre_only} {spots or ''} {structure} {' '.join(seen)}", make)
 
 
 def _body_points(m: Mechanics, spots: Spots | None) -> Chain:
@@ -98,15 +102,20 @@ def _body_points(m: Mechanics, spots: Spots | None) -> Chain:
 
 
 def _seen(
-    x: ca.SX, y: ca.SX, angle: ca.SX, values: dict[str, dict[str, ca.SX]], mass: ca.SX | None
+    x: ca.SX,
+    y: ca.SX,
+    angle: ca.SX,
+    effects: Sequence[Effect],
+    values: dict[str, dict[str, ca.SX]],
+    mass: ca.SX | None,
 ) -> tuple[ca.SX, ca.SX]:
     """Apply marker offsets, the mean over the body where only that is recorded, then the camera's errors."""
-    for effect in camera_effects():
+    for effect in effects:
         if effect.marker:
             x, y = effect.marker(values[effect.name], x, y, angle)
     if mass is not None:
         x, y = (ca.dot(mass, v) / ca.sum1(mass) for v in (x, y))
-    for effect in camera_effects():
+    for effect in effects:
         if effect.camera:
             x, y = effect.camera(values[effect.name], x, y)
     return x, y
@@ -146,14 +155,15 @@ def predict(
     nodes : Nodes
         The trial simulated at `values`.
     """
-    at = trial.time_s + nodes.clock_s
+    at = trial.time_s * (1 + nodes.clock_rate) + nodes.clock_s
     rate = _pose_rate(model, nodes, values)
     pose = _hermite(nodes.time_s, nodes.body[:, :3], rate, at)
     structure, kept = model.structure(values, coordinates)
     layout = state_layout(structure)
     shape = _hermite(nodes.time_s, nodes.shape(layout), nodes.shape_rate(layout), at)
     kappa = shape[:, : model.segments]
-    function = _picture(structure, centre_only, None if centre_only else trial.spots)
+    spots = None if centre_only else trial.spots
+    function = _picture(structure, centre_only, spots, model.camera)
     points, by_pose, by_shape, by_camera, by_p = evaluate(
         function, (pose, shape), nodes.camera, nodes.p[kept]
     )
@@ -181,7 +191,7 @@ def predict(
         by_bend = jac_shape
         if (bent := state_layout(soft)).stretches:  # lengths follow the pressure, not the bend
             loaded = _hermite(nodes.time_s, nodes.shape(bent), nodes.shape_rate(bent), at)
-            picture = _picture(soft, centre_only, None if centre_only else trial.spots)
+            picture = _picture(soft, centre_only, spots, model.camera)
             by_bend = evaluate(picture, (pose, loaded), nodes.camera, p)[2]
             by_bend = by_bend.reshape(frames, -1, seen).transpose(0, 2, 1)
         slopes[:, :, k] = (jac_pose @ _linear(nodes.time_s, began.pose, at))[..., 0]
@@ -191,6 +201,8 @@ def predict(
     in_time = jac_pose @ velocity[0][..., None] + jac_shape @ velocity[1][..., None]
     later = (by.clock_s - by.delay_s)[0]  # a delay of the valves shifts the motion in time
     slopes[:, :, later != 0] += in_time * later[later != 0]
+    faster = by.clock_rate[0]
+    slopes[:, :, faster != 0] += in_time * trial.time_s[:, None, None] * faster[faster != 0]
     shown = np.any(by.camera != 0, axis=0)
     slopes[:, :, shown] += jac_camera @ by.camera[:, shown]
     return Prediction(points, slopes, pose, kappa)

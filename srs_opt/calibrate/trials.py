@@ -116,7 +116,7 @@ class Trials:
 
     def __reduce__(self) -> tuple[object, ...]:
         """Travel without the compiled model and without what was found."""
-        model = self.model.robot, self.model.name
+        model = self.model.robot, self.model.name, self.model.generic
         trials = tuple(self._trials.values())
         return _restored, (*model, trials, self.noise, self.tolerance_m_s, self.keeps)
 
@@ -269,11 +269,17 @@ class Trials:
 
 
 @lru_cache(maxsize=4)
-def _model(robot: Robot, model: str) -> Model:
-    return Model(robot, model)
+def _model(robot: Robot, model: str, generic: bool) -> Model:
+    return Model(robot, model, generic=generic)
 
 
 def _restored(
-    robot: Robot, model: str, trials: Sequence[Trial], noise: Noise, tolerance_m_s: float, keeps: bool
+    robot: Robot,
+    model: str,
+    generic: bool,
+    trials: Sequence[Trial],
+    noise: Noise,
+    tolerance_m_s: float,
+    keeps: bool,
 ) -> Trials:
-    return Trials(_model(robot, model), trials, noise, tolerance_m_s, keeps=keeps)
+    return Trials(_model(robot, model, generic), trials, noise, tolerance_m_s, keeps=keeps)

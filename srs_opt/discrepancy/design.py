@@ -60,14 +60,14 @@ def rivals_of(selection: Selection, fitted: Sequence[Hypothesis]) -> tuple[Hypot
     The stories are the best fits that put the fault into different stages of the model, so that the answer
     says where to look.
     """
-    from srs_opt.model.effects import all_effects
+    from srs_opt.model.effects import known_effects
 
     found = [selection.best, *selection.rivals]
     if len(found) > 1 or not selection.best.candidates:
         return tuple(found)
 
     def stages(h: Hypothesis) -> set[str]:
-        return {all_effects()[c.effect].kind for c in h.candidates}
+        return {known_effects()[c.effect].kind for c in h.candidates}
 
     own = stages(selection.best)
     others = [h for h in fitted if h.candidates and stages(h) != own]
@@ -98,9 +98,9 @@ def next_experiment(
 
 def _own_instruments(a: Hypothesis, b: Hypothesis) -> list[str]:
     """Return the quantities that measure directly an effect that one of two hypotheses holds."""
-    from srs_opt.model.effects import all_effects
+    from srs_opt.model.effects import known_effects
 
-    asked = (all_effects()[name].instrument for name in {*a.names} ^ {*b.names})
+    asked = (known_effects()[name].instrument for name in {*a.names} ^ {*b.names})
     return sorted({q for q in asked if q in INSTRUMENTS})
 
 

@@ -52,12 +52,12 @@ def locate(examined: Examined, most: int = 8) -> tuple[Place, ...]:
 
 def stages(examined: Examined) -> tuple[Place, ...]:
     """Return the stages of the model, scored by the best effect that each could lack."""
-    from srs_opt.model.effects import all_effects
+    from srs_opt.model.effects import known_effects
 
     best: dict[str, tuple[float, int]] = {}
     temper = examined.linearisation.temper
     for score in examined.scores:
-        kind = all_effects()[score.candidate.effect].kind
+        kind = known_effects()[score.candidate.effect].kind
         gain = score.improvement * temper
         if gain > best.get(kind, (0.0, 1))[0]:
             best[kind] = (gain, score.dof)

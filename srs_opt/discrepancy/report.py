@@ -14,7 +14,7 @@ from srs_opt.discrepancy.pipeline import Discrepancy
 from srs_opt.discrepancy.verdict import NAMED, NAMED_IN_PART, NO_GAP, NOT_TESTABLE, ONE_OF, UNKNOWN
 from srs_opt.figures import Picture
 from srs_opt.files import write_text
-from srs_opt.model.effects import all_effects
+from srs_opt.model.effects import known_effects
 
 HEADLINES = {
     NO_GAP: "No gap: the calibrated model explains these data",
@@ -53,7 +53,7 @@ def write_report(
     page = template.render(
         headline=HEADLINES[record["verdict"]].format(names=" or ".join(n for n in names if n)),
         answer=record,
-        words=all_effects(),
+        words=known_effects(),
         dataset=found.dataset,
         split=found.split,
         calibrated=_parameters(found),

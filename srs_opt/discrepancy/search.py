@@ -173,7 +173,7 @@ class Search:
     def examine(self, hypothesis: Hypothesis) -> Examined:
         """Linearise about a fitted hypothesis, test what is left and screen what could explain it."""
         fit = hypothesis.fit
-        lin = self._linearise(fit)
+        lin = self.linearise(fit)
         groups = self.functions.groups()
         size, columns = len(lin.coordinates), next(iter(lin.grams.values())).raw.shape[0] - 1
         total = sum_eliminated(lin.grams, 1.0)
@@ -208,7 +208,8 @@ class Search:
             self.again(h)
         return self.fitted
 
-    def _linearise(self, fit: Fit) -> Linearisation:
+    def linearise(self, fit: Fit) -> Linearisation:
+        """Return the normal equations at a fit, all candidates among the coordinates."""
         names = {c.name for c in fit.coordinates}
         others = [c for k in self.candidates for c in k.sizes if c.name not in names]
         coordinates = (*fit.coordinates, *others)

@@ -18,7 +18,7 @@ from srs_opt.gait_opt.goal import (
     Limits,
 )
 from srs_opt.gait_opt.score import broken_constraints, evaluated, robot_scores
-from srs_opt.model.effects import all_effects
+from srs_opt.model.effects import known_effects
 from srs_opt.orbit.attractors import other_orbits
 from srs_opt.orbit.steady import Orbit, body_over_cycle, integrator, steady_gait
 from srs_opt.robot import Robot
@@ -225,7 +225,7 @@ def standing_start(robot: Robot, gait: Gait, model: str, cycles: int = CYCLES) -
 
 def _undelayed(robot: Robot, model: str) -> Integrator:
     """Return the robot's integrator without delays: they shift the whole cycle in time, nothing else."""
-    own = tuple(e for e in robot.effects if all_effects()[e["name"]].delay is None)
+    own = tuple(e for e in robot.effects if known_effects()[e["name"]].delay is None)
     return integrator(replace(robot, valve_delay_s=0.0, effects=own), model)
 
 

@@ -20,7 +20,7 @@ from srs_opt.errors import NoAnswerError
 from srs_opt.measurement.actuator_bench import ActuatorBench, combine_steps
 from srs_opt.measurement.records import Array, StepTest
 from srs_opt.measurement.steps import StepFit, fit_steps
-from srs_opt.model.effects import all_effects
+from srs_opt.model.effects import known_effects
 from srs_opt.robot import Robot
 from srs_opt.simulate.integrate import Integrator
 from srs_opt.simulate.timeline import Timeline
@@ -132,7 +132,7 @@ class _Problem:
     """Residuals of the tests on the ground and of what is known before, with their derivatives."""
 
     def __init__(self, robot: Robot, pairs: list[_Pair], known: Array, sds: Array) -> None:
-        delays = [e for e in robot.effects if all_effects()[e["name"]].delay is not None]
+        delays = [e for e in robot.effects if known_effects()[e["name"]].delay is not None]
         self.robot = robot.with_values(
             friction_speed_m_s=FRICTION_SPEED_M_S,
             valve_delay_s=0.0,

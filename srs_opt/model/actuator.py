@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
+from srs_opt.model.effects.effect import Actuation
 from srs_opt.model.parameters import Parameters
 
 _SERIES_RADIUS = 0.1
@@ -53,7 +54,7 @@ class Actuator:
         self.parameters = parameters
         self.segments = parameters.structure.segments
         self.linear = not any(effect.nonlinear_actuator for effect, _ in parameters.effects)
-        self.memories = sum(effect.memory_rate is not None for effect, _ in parameters.effects)
+        self.memories = sum(effect.remembers for effect, _ in parameters.effects)
         self.states = self.segments * (2 + self.memories)
 
     def unstack(self, vector: ca.SX) -> ActuatorState:
@@ -62,12 +63,20 @@ class Actuator:
         parts = [vector[i * n : (i + 1) * n] for i in range(2 + self.memories)]
         return ActuatorState(parts[0], parts[1], tuple(parts[2:]))
 
-    def target(self, valve: ca.SX) -> ca.SX:
-        """Return the curvature K that each segment settles at, for valve states in [-1, 1], (N-1, 1)."""
-        p = self.parameters
+    def target(self, valve: ca.SX, state: ActuatorState | None = None) -> ca.SX:
+        """Return the curvature K that each segment settles at, for valve states in [-1, 1], (N-1, 1).
+
+        Effects that depend on time ask for the `state`.
+        """
+        p, none = self.parameters, ca.SX.zeros(self.segments, 1)
         amplitude = p["curvature_per_pressure_1_m_kpa"] * p["pressure_kpa"]
-        bias = ca.SX.zeros(self.segments, 1)
+        bias = none
+        memories = iter(state.memory if state else ())
         for effect, e in p.effects:
+            memory = next(memories, none) if effect.remembers else none
+            if effect.command is not None:
+                kappa = state.kappa if state else none
+                valve = effect.command(e, Actuation(valve, kappa, p["pressure_kpa"], memory))
             if effect.gain is not None:
                 amplitude = amplitude * effect.gain(e, p["frequency_hz"])
             if effect.bias is not None:
@@ -82,15 +91,24 @@ class Actuator:
         memory_rates: list[ca.SX] = []
         for effect, e in p.effects:
             memory = ca.SX.zeros(self.segments, 1)
-            if effect.memory_rate is not None:
+            if effect.remembers:
                 memory = state.memory[len(memory_rates)]
-                memory_rates.append(effect.memory_rate(e, state.dkappa, memory))
+                own = (
+                    effect.memory_rate(e, state.dkappa, memory)
+                    if effect.memory_rate
+                    else ca.SX.ones(memory.shape)
+                )
+                memory_rates.append(own)
             if effect.restoring is not None:
                 restoring = restoring + effect.restoring(e, state.kappa, memory)
             if effect.slow_down is not None:
                 slow = slow * effect.slow_down(e, valve, state.kappa)
+            if effect.slowness is not None:
+                slow = slow * effect.slowness(e, Actuation(valve, state.kappa, p["pressure_kpa"], memory))
         tau1, tau2 = p["tau1_s"] * slow, p["tau2_s"] * slow
-        ddkappa = (self.target(valve) - restoring) / (tau1 * tau2) - (1 / tau1 + 1 / tau2) * state.dkappa
+        ddkappa = (self.target(valve, state) - restoring) / (tau1 * tau2) - (
+            1 / tau1 + 1 / tau2
+        ) * state.dkappa
         return ActuatorState(state.dkappa, ddkappa, tuple(memory_rates))
 
     def jerk(self, state: ActuatorState, valve: ca.SX) -> ca.SX:

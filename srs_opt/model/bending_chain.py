@@ -75,7 +75,7 @@ class BendingChain:
         """
         model, n = self.model, self.links
         m = self.motion(y, dy, ddy, h, drive)
-        f = self.forces(m.place, m.velocity, m.cos, m.sin, drive.frame)
+        f = self.forces(m.place, m.velocity, m.cos, m.sin, drive.frame, self.kappa(y))
         net_x, net_y = h * f.x - model.mass * m.acceleration[0], h * f.y - model.mass * m.acceleration[1]
         joint = self.joint_forces(net_x, net_y)
         q = self._moment(y, dy, drive) * h
@@ -156,13 +156,15 @@ class BendingChain:
         x, y_, vx, vy, ax, ay = (ca.vertcat(*row) for row in rows)
         return Motion(segments, ca.vertcat(*cosines), ca.vertcat(*sines), (x, y_), (vx, vy), (ax, ay))
 
-    def forces(self, place: Vector, velocity: Vector, cos: ca.SX, sin: ca.SX, frame: ca.SX) -> Forces:
+    def forces(
+        self, place: Vector, velocity: Vector, cos: ca.SX, sin: ca.SX, frame: ca.SX, kappa: ca.SX
+    ) -> Forces:
         """Return the forces on the links at places and velocities in a frame (x, y, heading) of the room."""
         x, y, heading = frame[0], frame[1], frame[2]
         c, s = ca.cos(heading), ca.sin(heading)
         room_x, room_y = x + c * place[0] - s * place[1], y + s * place[0] + c * place[1]
         v = Chain(*velocity, ca.SX.zeros(self.links, 1))
-        return self.model.forces_on_links(v, cos, sin, room_x, room_y, heading)
+        return self.model.forces_on_links(v, cos, sin, room_x, room_y, heading, kappa)
 
     def joint_forces(self, x: ca.SX, y: ca.SX) -> list[Vector]:
         """Return the sums of the links' rows from each link on to the head: entry k from link k + 1."""

@@ -86,7 +86,7 @@ def derivatives(chain: BendingChain, y: ca.SX, dy: ca.SX, ddy: ca.SX, drive: Dri
         If an effect makes the force on one link depend on another link's motion.
     """
     motion = chain.motion(y, dy, ddy, ca.SX(1), drive)
-    slopes = _force_slopes(chain, motion, y[2:], drive)
+    slopes = _force_slopes(chain, motion, y, drive)
     moves, moves1, moves2 = _moves(chain, motion.segments, dy, ddy)
     loads = [_mass(chain), _Loads.of(slopes.by_velocity), _Loads.of(slopes.by_place)]
     assembly = _Assembly(moves, loads)
@@ -256,17 +256,20 @@ class _Slopes:
     force: Pair
 
 
-def _force_slopes(chain: BendingChain, m: Motion, theta: ca.SX, drive: Drive) -> _Slopes:
-    n = chain.links
+def _force_slopes(chain: BendingChain, m: Motion, y: ca.SX, drive: Drive) -> _Slopes:
+    n, theta = chain.links, y[2:]
     r, v, th = ca.SX.sym("r", 2 * n), ca.SX.sym("v", 2 * n), ca.SX.sym("theta", n)
     frame, p = ca.SX.sym("frame", 3), chain.model.parameters.vector
-    f = chain.forces((r[:n], r[n:]), (v[:n], v[n:]), ca.cos(th), ca.sin(th), frame)
+    # what friction makes of a bend is left out of the slopes: it is small beside the bending stiffness, and
+    # only the steps' matrix asks for them, not the motion
+    bend = ca.SX.sym("bend", n - 1)
+    f = chain.forces((r[:n], r[n:]), (v[:n], v[n:]), ca.cos(th), ca.sin(th), frame, bend)
     jacobians = [ca.jacobian(ca.vertcat(f.x, f.y), of) for of in (v, r, th)]
     jacobians += [ca.jacobian(f.friction_power, of) for of in (v, r, th)]
     _check_local(jacobians[:3], n)
-    slopes = ca.Function("slopes", [r, v, th, frame, p], [*jacobians, f.x, f.y], {"cse": True})
+    slopes = ca.Function("slopes", [r, v, th, frame, bend, p], [*jacobians, f.x, f.y], {"cse": True})
     place, velocity = ca.vertcat(*m.place), ca.vertcat(*m.velocity)
-    f_v, f_r, f_th, p_v, p_r, p_th, x, y = slopes(place, velocity, theta, drive.frame, p)
+    f_v, f_r, f_th, p_v, p_r, p_th, f_x, f_y = slopes(place, velocity, theta, drive.frame, chain.kappa(y), p)
 
     def block(matrix: ca.SX, i: int) -> ca.SX:
         return matrix[[i, n + i], [i, n + i]]
@@ -278,7 +281,7 @@ def _force_slopes(chain: BendingChain, m: Motion, theta: ca.SX, drive: Drive) ->
         power_by_velocity=[p_v[0, [i, n + i]] for i in range(n)],
         power_by_place=[p_r[0, [i, n + i]] for i in range(n)],
         power_by_heading=p_th,
-        force=(x, y),
+        force=(f_x, f_y),
     )
 
 

@@ -139,22 +139,31 @@ class Mechanics(ABC):
         room_x = pose[0] + c * chain.x - s * chain.y
         room_y = pose[1] + s * chain.x + c * chain.y
         v = self.link_velocities(u_x, u_y, yaw_rate)
-        return self.forces_on_links(v, chain.cos, chain.sin, room_x, room_y, pose[2])
+        return self.forces_on_links(v, chain.cos, chain.sin, room_x, room_y, pose[2], self.kappa)
 
     def forces_on_links(
-        self, v: Chain, cos: ca.SX, sin: ca.SX, room_x: ca.SX, room_y: ca.SX, frame_heading: ca.SX
+        self,
+        v: Chain,
+        cos: ca.SX,
+        sin: ca.SX,
+        room_x: ca.SX,
+        room_y: ca.SX,
+        frame_heading: ca.SX,
+        kappa: ca.SX,
     ) -> Forces:
         """Return the forces on links that move at `v`, in any frame that stands at `frame_heading`.
 
         Friction on link i is -(normal force) [mu_t d_t t + mu_n d_n n] in wheel axes, with the
         smoothed sliding directions d of the robot's friction law (paper, Fig. 2 and Table 1).
         `cos`, `sin` are those of the links' headings in the frame, `room_x`, `room_y` their places in
-        the room (effects of the room ask for them), (N, 1) each.
+        the room (effects of the room ask for them), (N, 1) each; `kappa` (N-1, 1) the curvatures.
         """
         p, n = self.parameters, self.links
         normal = self.normal_force()
         c, s = cos, sin
+        bend = _at_links(kappa)
         skews = [effect.wheel_angle(e, n) for effect, e in p.effects if effect.wheel_angle]
+        skews += [effect.steering(e, bend) for effect, e in p.effects if effect.steering]
         if skews:
             skew = sum(skews[1:], skews[0])
             c, s = cos * ca.cos(skew) - sin * ca.sin(skew), sin * ca.cos(skew) + cos * ca.sin(skew)
@@ -165,10 +174,6 @@ class Mechanics(ABC):
         for effect, e in p.effects:
             f_t = f_t * effect.rolling_factor(e, v_t) if effect.rolling_factor else f_t
             f_n = f_n * effect.skidding_factor(e, v_n) if effect.skidding_factor else f_n
-        for effect, e in p.effects:
-            f_t = f_t + effect.rolling_force(e, v_t) if effect.rolling_force else f_t
-        friction_power = -(ca.dot(f_t, v_t) + ca.dot(f_n, v_n))
-        x, y = c * f_t - s * f_n, s * f_t + c * f_n
         state = LinkState(
             room_x=room_x,
             room_y=room_y,
@@ -178,7 +183,19 @@ class Mechanics(ABC):
             mass=self.mass,
             gravity=p["gravity_m_s2"],
             friction_speed=p["friction_speed_m_s"],
+            cos=cos,
+            sin=sin,
+            along=v_t,
+            across=v_n,
+            curvature=bend,
         )
+        for effect, e in p.effects:
+            if effect.wheel_factors:
+                on_rolling, on_skidding = effect.wheel_factors(e, state)
+                f_t, f_n = f_t * on_rolling, f_n * on_skidding
+            f_t = f_t + effect.rolling_force(e, v_t) if effect.rolling_force else f_t
+        friction_power = -(ca.dot(f_t, v_t) + ca.dot(f_n, v_n))
+        x, y = c * f_t - s * f_n, s * f_t + c * f_n
         for effect, e in p.effects:
             if effect.link_force:
                 fx, fy = effect.link_force(e, state)
@@ -206,3 +223,8 @@ class Mechanics(ABC):
             self.yaw_momentum_rate(f, yaw_rate),
         )
         return rate, f.friction_power
+
+
+def _at_links(kappa: ca.SX) -> ca.SX:
+    """Return the mean curvature of the segments beside each link, (N, 1)."""
+    return ca.vertcat(kappa[0], (kappa[1:] + kappa[:-1]) / 2, kappa[-1])

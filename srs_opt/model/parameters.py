@@ -11,7 +11,7 @@ import casadi as ca
 import numpy as np
 
 from srs_opt.errors import InputError, UnsupportedEffectError
-from srs_opt.model.effects import all_effects
+from srs_opt.model.effects import known_effects
 from srs_opt.model.effects.effect import Effect
 from srs_opt.robot import Robot
 
@@ -65,7 +65,9 @@ class Structure:
         """
         present = [str(e["name"]) for e in dynamic_effects(robot, room=room) if _present(e)]
         # an effect of single places is there once for all of them
-        names = tuple(n for k, n in enumerate(present) if not all_effects()[n].place or n not in present[:k])
+        names = tuple(
+            n for k, n in enumerate(present) if not known_effects()[n].place or n not in present[:k]
+        )
         structure = Structure(model or robot.own_model, robot.links, robot.friction_law, names)
         if structure.compliant and not robot.is_soft:
             raise InputError(
@@ -95,7 +97,7 @@ def dynamic_effects(robot: Robot, *, room: bool = True) -> list[Mapping[str, Any
 
     Delays act on the valve schedule and measurement effects on the camera; neither is here.
     """
-    known = all_effects()
+    known = known_effects()
     chosen = [
         s for s in robot.effects
         if known[s["name"]].in_equations and (room or not known[s["name"]].knows_the_room)
@@ -108,19 +110,21 @@ def dynamic_effects(robot: Robot, *, room: bool = True) -> list[Mapping[str, Any
 
 
 def _present(spec: Mapping[str, Any]) -> bool:
-    return bool(spec[all_effects()[spec["name"]].size.name] != 0)
+    return bool(spec[known_effects()[spec["name"]].size.name] != 0)
 
 
 def room_effects(robot: Robot) -> list[str]:
     """Return the names of the robot's effects that break the periodic orbit."""
-    return [str(s["name"]) for s in robot.effects if all_effects()[s["name"]].knows_the_room and _present(s)]
+    return [
+        str(s["name"]) for s in robot.effects if known_effects()[s["name"]].knows_the_room and _present(s)
+    ]
 
 
 def valve_delay_s(robot: Robot) -> float:
     """Return the total delay between command and valve, s (the robot's own and that of its effects)."""
     delay = robot.valve_delay_s
     for spec in robot.effects:
-        hook = all_effects()[spec["name"]].delay
+        hook = known_effects()[spec["name"]].delay
         if hook is not None:
             delay += float(hook(spec))
     return delay
@@ -142,7 +146,7 @@ class Parameters:
         symbols: dict[str, ca.SX] = {n: ca.SX.sym(n) for n in structure.parameter_names}
         self.effects: list[tuple[Effect, dict[str, ca.SX]]] = []
         for index, name in enumerate(structure.effects):
-            effect = all_effects().get(name)
+            effect = known_effects().get(name)
             if effect is None:
                 raise UnsupportedEffectError(f"effect '{name}' is not part of any model")
             own = effect_symbols(effect, structure.links, f"{index}.")
@@ -195,7 +199,7 @@ def effect_symbols(effect: Effect, links: int, prefix: str = "") -> dict[str, ca
 
 def _placed(effect: str | Mapping[str, Any]) -> bool:
     name = effect if isinstance(effect, str) else effect["name"]
-    return all_effects()[name].place is not None
+    return known_effects()[name].place is not None
 
 
 def _over_places(effect: Effect, entries: list[Mapping[str, Any]], own: Mapping[str, ca.SX]) -> list[float]:

@@ -21,6 +21,26 @@ def all_effects() -> Mapping[str, Effect]:
     return _together(tuple((name, entry.definition) for name, entry in own.items()))
 
 
+@lru_cache(maxsize=1)
+def generic_effects() -> Mapping[str, Effect]:
+    """Return the effects that describe what is in no list: the terms of `srs_opt.model.effects.generic`."""
+    from srs_opt.model.effects.generic import TERMS
+
+    return MappingProxyType({name: term.effect for name, term in TERMS.items()})
+
+
+def known_effects() -> Mapping[str, Effect]:
+    """Return everything that a robot file may name: all effects, then those that only describe."""
+    from srs_opt.model.effects.own import registered
+
+    return _all_known(tuple((name, entry.definition) for name, entry in registered().items()))
+
+
+@lru_cache(maxsize=4)
+def _all_known(own: tuple[tuple[str, str], ...]) -> Mapping[str, Effect]:
+    return MappingProxyType({**_together(own), **generic_effects()})
+
+
 @lru_cache(maxsize=4)
 def _together(own: tuple[tuple[str, str], ...]) -> Mapping[str, Effect]:
     from srs_opt.model.effects.own import registered
@@ -60,7 +80,7 @@ def register_effect(effect: Effect) -> Effect:
     """
     from srs_opt.model.effects import own
 
-    own.add(effect, set(built_in()))
+    own.add(effect, {*built_in(), *generic_effects()})
     return effect
 
 

@@ -22,10 +22,19 @@ KINDS = ("tether", "room", "body", "ground", "actuation", "measurement", "clock"
 
 @dataclass(frozen=True)
 class LinkState:
-    """What an external force may depend on; vectors are (N, 1), lengths m, speeds m/s.
+    """What a force on the links may depend on; vectors are (N, 1), lengths m, speeds m/s.
 
     Room coordinates are for effects that know where the robot is; velocities stand in
     the robot's frame, and so do the forces that a hook returns.
+
+    Attributes
+    ----------
+    cos, sin : SX (N, 1)
+        Of the links' headings in the robot's frame, which stands at `heading` in the room.
+    along, across : SX (N, 1)
+        Speeds in wheel axes.
+    curvature : SX (N, 1)
+        Mean of the neighbouring segments, 1/m.
     """
 
     room_x: ca.SX
@@ -36,6 +45,32 @@ class LinkState:
     mass: ca.SX
     gravity: ca.SX
     friction_speed: ca.SX
+    cos: ca.SX
+    sin: ca.SX
+    along: ca.SX
+    across: ca.SX
+    curvature: ca.SX
+
+
+@dataclass(frozen=True)
+class Actuation:
+    """What acts on the segments; vectors are (N-1, 1).
+
+    Attributes
+    ----------
+    valve : SX
+        States of the valves, -1 to 1.
+    kappa : SX
+        Curvatures, 1/m.
+    pressure_kpa : SX
+    time_s : SX
+        Since the start of the motion, for effects that are `timed`; else zero.
+    """
+
+    valve: ca.SX
+    kappa: ca.SX
+    pressure_kpa: ca.SX
+    time_s: ca.SX
 
 
 @dataclass(frozen=True)
@@ -62,17 +97,23 @@ class Effect:
     wheel_angle : hook; added to the wheels' angle against their link (rad).
     rolling_factor, skidding_factor : hooks (e, speed); multiply the Coulomb term along, across.
     rolling_force : hook (e, speed along the wheel); extra force along the wheel (N).
+    wheel_factors : hook (e, LinkState); factors on the Coulomb terms along and across.
+    steering : hook (e, curvature at the links); added to the wheels' angle (rad).
     link_force : hook (e, LinkState); forces (fx, fy) on the links in the robot's frame.
     flexibility, relaxation : hooks (e); added to 1/EI of the segments (1/(N m^2), which makes the bends
         coordinates of their own); the material's relaxation time where the robot has none (s).
     gain, bias : hooks (e, frequency) and (e); factor on C0, offset of the curvature target (1/m).
+    command : hook (e, Actuation); the states of the valves that the pressure acts with.
     slow_down : hook (e, valve, kappa); factor on both time constants.
+    slowness : hook (e, Actuation); the same, for what depends on more.
     restoring : hook (e, kappa, memory); added to the restoring curvature.
     memory_rate : hook (e, dkappa, memory); rate of the effect's own state per segment.
     delay : hook (e); added to the valves' delay, s.
     marker : hook (e, x, y, theta); where the camera's markers sit, room coordinates (m).
     camera : hook (e, x, y); where a point of the room is seen (m).
-    clock : hook (e); the sample labelled t was taken at t + clock.
+    clock, clock_rate : hooks (e); the sample labelled t was taken at t (1 + clock_rate) + clock.
+    timed : bool
+        Whether its hooks depend on the time since the start of the motion.
     """
 
     name: str
@@ -92,17 +133,23 @@ class Effect:
     skidding_factor: Callable[[Symbols, ca.SX], ca.SX] | None = None
     rolling_force: Callable[[Symbols, ca.SX], ca.SX] | None = None
     link_force: Callable[[Symbols, LinkState], tuple[ca.SX, ca.SX]] | None = None
+    wheel_factors: Callable[[Symbols, LinkState], tuple[ca.SX, ca.SX]] | None = None
+    steering: Callable[[Symbols, ca.SX], ca.SX] | None = None
     flexibility: Callable[[Symbols], ca.SX] | None = None
     relaxation: Callable[[Symbols], ca.SX] | None = None
     gain: Callable[[Symbols, ca.SX], ca.SX] | None = None
     bias: Callable[[Symbols], ca.SX] | None = None
+    command: Callable[[Symbols, Actuation], ca.SX] | None = None
     slow_down: Callable[[Symbols, ca.SX, ca.SX], ca.SX] | None = None
+    slowness: Callable[[Symbols, Actuation], ca.SX] | None = None
     restoring: Callable[[Symbols, ca.SX, ca.SX], ca.SX] | None = None
     memory_rate: Callable[[Symbols, ca.SX, ca.SX], ca.SX] | None = None
     delay: Callable[[Mapping[str, Any]], Any] | None = None
     marker: Callable[[Symbols, ca.SX, ca.SX, ca.SX], tuple[ca.SX, ca.SX]] | None = None
     camera: Callable[[Symbols, ca.SX, ca.SX], tuple[ca.SX, ca.SX]] | None = None
     clock: Callable[[Mapping[str, Any]], Any] | None = None
+    clock_rate: Callable[[Mapping[str, Any]], Any] | None = None
+    timed: bool = False
 
     @property
     def size(self) -> EffectParameter:
@@ -127,7 +174,7 @@ class Effect:
     @property
     def in_equations(self) -> bool:
         """Whether it enters the equations of motion (delays act on the valves' schedule instead)."""
-        return bool(self.hooks - {"delay", "marker", "camera", "clock"})
+        return bool(self.hooks - OUTSIDE)
 
     @property
     def seen_by_camera(self) -> bool:
@@ -137,12 +184,17 @@ class Effect:
     @property
     def nonlinear_actuator(self) -> bool:
         """Whether the curvature loses its closed form."""
-        return self.slow_down is not None or self.restoring is not None
+        return self.timed or bool(self.hooks & {"slow_down", "slowness", "restoring"})
+
+    @property
+    def remembers(self) -> bool:
+        """Whether the segments have a further state: the effect's own, or the time."""
+        return self.timed or self.memory_rate is not None
 
     @property
     def knows_the_room(self) -> bool:
-        """Whether the motion depends on where in the room the robot is (no periodic orbit then)."""
-        return self.kind == "room"
+        """Whether the motion depends on place in the room, or on time (no periodic orbit then)."""
+        return self.timed or self.kind == "room"
 
     @property
     def of_tether(self) -> bool:
@@ -150,6 +202,8 @@ class Effect:
         return self.kind == "tether" if self.through_tether is None else self.through_tether
 
 
+# hooks that act on the valves' schedule, or on what is seen
+OUTSIDE = frozenset({"delay", "marker", "camera", "clock", "clock_rate"})
 HOOKS = tuple(f.name for f in dataclasses.fields(Effect) if str(f.type).startswith("Callable"))
 
 

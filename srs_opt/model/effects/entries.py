@@ -7,7 +7,7 @@ from types import MappingProxyType
 from typing import Any
 
 from srs_opt.document import Document, Place, unknown_word
-from srs_opt.model.effects import all_effects, known_plugins
+from srs_opt.model.effects import known_effects, known_plugins
 from srs_opt.model.effects.effect import Effect
 from srs_opt.model.effects.parameter import EffectParameter
 from srs_opt.model.effects.parameter import Place as PlaceParameter
@@ -30,7 +30,7 @@ def check_effects(
     seen: set[tuple[Any, ...]] = set()
     for index, entry in enumerate(entries):
         values = check_effect(document, index, entry, links)
-        place = all_effects()[entry["name"]].place
+        place = known_effects()[entry["name"]].place
         identity = (entry["name"], values[place.name] if place else None)
         if identity in seen:
             raise document.error(("effects", index), f"effect '{entry['name']}' is listed twice")
@@ -42,9 +42,9 @@ def check_effects(
 def check_effect(document: Document, index: int, entry: dict[str, Any], links: int) -> Mapping[str, Any]:
     """Validate one entry of the list as `check_effects` does, whatever the others say."""
     place: Place = ("effects", index)
-    effect = all_effects().get(entry["name"])
+    effect = known_effects().get(entry["name"])
     if effect is None:
-        raise document.error((*place, "name"), unknown_word("effect", entry["name"], sorted(all_effects())))
+        raise document.error((*place, "name"), unknown_word("effect", entry["name"], sorted(known_effects())))
     known = {p.name: p for p in effect.parameters}
     for key in entry:
         if key not in ("name", SD) and key not in known:
@@ -123,7 +123,7 @@ def check_body(
 
     mass, gap = ca.SX.ones(links, 1) * link_mass_kg, ca.SX(gap_m)
     for index, entry in enumerate(entries):
-        effect = all_effects()[entry["name"]]
+        effect = known_effects()[entry["name"]]
         if not effect.extra_mass and not effect.gap_extra:
             continue
         e, where = spread_over_places(effect, entry, links), ("effects", index, effect.size.name)

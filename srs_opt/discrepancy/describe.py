@@ -1,0 +1,197 @@
+"""After an unknown gap: the term of the grammar that describes it, if one does and no other does as well.
+
+The listed effects have failed, so the gap is mostly large: calibration alone has bent the robot's values for it,
+and what the slopes there say of a term can be far from what the term does. So terms are screened about the bench's
+values too, the best of both screens are fitted to the start of a few trials, and the one that leaves least is
+exchanged for others while that helps.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from srs_opt.calibrate.candidates import Candidate, effect_spec, entry_sd
+from srs_opt.calibrate.fit import Fit, start_point
+from srs_opt.calibrate.forms import forms_of
+from srs_opt.discrepancy.examined import needed_gain
+from srs_opt.discrepancy.hypothesis import Hypothesis
+from srs_opt.discrepancy.screen import Linearisation, Score, expected_start, screen
+from srs_opt.discrepancy.seal import Gap, open_seal
+from srs_opt.discrepancy.search import Search
+from srs_opt.measurement.records import Trial
+from srs_opt.model.effects import generic_effects
+from srs_opt.model.effects.generic import TERMS, Term
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What a description must do to be given.
+
+    Attributes
+    ----------
+    closes : float
+        Share of the gap on sealed trials.
+    lead : float
+        Share of what the next best explanation leaves (the best listed effects, or a term that acts on something
+        else or elsewhere) that this one may leave at most.
+    refits : int
+        Terms that are fitted, the best of the screens.
+    exchanges : int
+        Rounds of looking for a better term from where the best one stands.
+    """
+
+    closes: float = 0.75
+    lead: float = 0.5
+    refits: int = 8
+    exchanges: int = 3
+
+
+DEFAULT = Settings()
+
+
+@dataclass(frozen=True)
+class Description:
+    """What the grammar says of a gap.
+
+    Attributes
+    ----------
+    best : Hypothesis
+        One term, fitted to the open trials.
+    gap : Gap or None
+        On the sealed trials, from calibration alone to this.
+    tried : tuple of Hypothesis
+        All terms that were fitted, to the start of a few trials, best first.
+    why_not : str
+        Why it is not believed; empty when it is.
+    """
+
+    best: Hypothesis
+    gap: Gap | None
+    tried: tuple[Hypothesis, ...]
+    why_not: str
+
+    @property
+    def term(self) -> Term:
+        """The term."""
+        return TERMS[self.best.candidates[0].effect]
+
+    @property
+    def sentence(self) -> str:
+        """What the term says, with its fitted size."""
+        candidate, fit = self.best.candidates[0], self.best.fit
+        return self.term.sentence(effect_spec(candidate, fit.point.values), entry_sd(candidate.form, fit))
+
+
+def terms_of(links: int, present: Sequence[str] = ()) -> tuple[Candidate, ...]:
+    """Return every term of the grammar at every place, but for those whose labels are `present`."""
+    found = (Candidate(form) for effect in generic_effects().values() for form in forms_of(effect, links))
+    return tuple(c for c in found if c.label not in present)
+
+
+def describe(
+    search: Search, null: Fit, listed: Fit, sealed: Sequence[Trial], settings: Settings = DEFAULT
+) -> Description | None:
+    """Return the best description; None where no term can be fitted.
+
+    Parameters
+    ----------
+    search : Search
+        With the terms as candidates.
+    null, listed : Fit
+        Calibration alone, and the best set of listed effects, of the same trials.
+    sealed : sequence of Trial
+    """
+    tried = sorted(_fitted(search, null, settings), key=_left)
+    found = None
+    for h in _contenders(tried, settings):
+        whole = search.fit(h.candidates, h.fit.point)
+        if whole is not None and (found is None or _left(whole) < _left(found)):
+            found = whole
+    if found is None:
+        return None
+    gap = open_seal(search.experiment, null, found.fit, sealed, search.seed)
+    why_not = _doubt(found, gap, tried, null, listed, len(search.candidates), settings)
+    return Description(found, gap, tuple(tried), why_not)
+
+
+def _fitted(search: Search, null: Fit, settings: Settings) -> list[Hypothesis]:
+    """Return what was fitted to the start of a few trials."""
+    brief = Search(search.experiment, search.base, search.candidates, search.quick, search.seed)
+    first = search.try_out((), null.point)
+    if first is None:
+        return []
+    found: dict[str, Hypothesis] = {}
+
+    def attempt(lin: Linearisation, score: Score) -> None:
+        label = score.candidate.label
+        if label not in found:
+            beat = min((h.deviance for h in found.values()), default=math.inf)
+            h = search.try_out((score.candidate,), expected_start(lin, score), beat)
+            if h is not None:
+                found[label] = h
+
+    bench = replace(first.fit, point=start_point(search.base))
+    screens = []
+    for fit in (first.fit, bench):
+        lin = brief.linearise(fit)
+        screens.append([(lin, score) for score in screen(lin, search.candidates)])
+    for lin, score in itertools.chain.from_iterable(zip(*screens)):
+        if len(found) < settings.refits:
+            attempt(lin, score)
+    for _ in range(settings.exchanges):
+        leader = min(found.values(), key=_left, default=None)
+        if leader is None:
+            break
+        lin = brief.linearise(leader.fit)
+        others = [c for c in search.candidates if c.label not in found]
+        for score in screen(lin, others, dropped=leader.candidates)[:2]:
+            attempt(lin, score)
+        if min(found.values(), key=_left) is leader:
+            break
+    return list(found.values())
+
+
+def _contenders(tried: Sequence[Hypothesis], settings: Settings) -> list[Hypothesis]:
+    """Return what is fitted to all trials: the best, and one more that comes near it."""
+    return [h for h in tried[:2] if _left(tried[0]) > settings.lead * _left(h)]
+
+
+def _left(hypothesis: Hypothesis) -> float:
+    """Return the misfit beyond the noise."""
+    return max(hypothesis.fit.misfit_ratio - 1, 1e-3)
+
+
+def _doubt(
+    found: Hypothesis,
+    gap: Gap | None,
+    tried: Sequence[Hypothesis],
+    null: Fit,
+    listed: Fit,
+    family: int,
+    settings: Settings,
+) -> str:
+    """Return why a description is not believed; empty when nothing is against it."""
+    if null.deviance - found.deviance < needed_gain(found.candidates[0], family):
+        return "it gains no more than the best of as many terms does by chance"
+    if _left(found) > settings.lead * max(listed.misfit_ratio - 1, 1e-3):
+        return "listed effects do about as well"
+    if gap is None or gap.ratio is None or gap.ratio > 1 - settings.closes:
+        closed = 0.0 if gap is None or gap.ratio is None else 1 - gap.ratio
+        return f"it closes only {closed:.0%} of the gap on the sealed trials"
+    rivals = [h for h in tried if _says(h) != _says(found)]
+    own = next(h for h in tried if h.label == found.label)
+    if rivals and _left(own) > settings.lead * _left(rivals[0]):
+        return f"{rivals[0].label} does about as well"
+    return found.against_the_bench()
+
+
+def _says(hypothesis: Hypothesis) -> tuple[str, int | None]:
+    """Return what a description says acts, and where."""
+    candidate = hypothesis.candidates[0]
+    return TERMS[candidate.effect].acts, candidate.place
+
+
+__all__ = ["DEFAULT", "Description", "Settings", "describe", "terms_of"]
