@@ -58,6 +58,12 @@ class Experiment:
         ordered = [sorted(group, key=lambda t: -t.frequency_hz) for group in groups or (self.trials,)]
         costs = [{t.name: float(t.time_s[-1]) for t in group} for group in ordered]
         self._shared = where.share(self.work, costs)
+        self._rest = bench, where, groups
+
+    def with_generic_terms(self) -> Experiment:
+        """Return the same trials held against the model with the terms of the grammar as its effects."""
+        model = Model(self.model.robot, self.model.name, generic=True)
+        return Experiment(model, self.trials, self.sd_m, *self._rest)
 
     @property
     def sd_m(self) -> float:

@@ -227,7 +227,7 @@ def _layout(structure: Structure, full: Structure) -> tuple[str, ...]:
 def _functions(
     full: Structure, forms: tuple[Form, ...], names: tuple[str, ...], seen: tuple[str, ...]
 ) -> tuple[ca.Function, ca.Function]:
-    """Return ``(coordinates, bench, conditions) -> (p, camera, delay, clock, rate)``, and the Jacobian of each."""
+    """Return ``(coordinates, bench, conditions) -> (p, camera, delay, clock, rate)``, and the Jacobians."""
     z, now = ca.SX.sym("z", len(names)), ca.SX.sym("now", len(_CONDITIONS))
     values = {name: z[k] for k, name in enumerate(names)}
     robot_names = [n for n in names if "." not in n]

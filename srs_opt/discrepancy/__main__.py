@@ -105,7 +105,8 @@ def _written(options: argparse.Namespace, found: Discrepancy, maze: Maze | None)
     robot = corrected_robot(found)
     files = []
     if robot is not None:
-        files.append(save_robot(robot, options.out / "corrected_robot.yaml"))
+        name = "described_robot" if found.verdict.word == "described" else "corrected_robot"
+        files.append(save_robot(robot, options.out / f"{name}.yaml"))
     record = answer(found, files[0] if files else None)
     summary = _summary(found)
     further: list[Picture] = []

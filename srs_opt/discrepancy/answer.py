@@ -11,6 +11,7 @@ from srs_opt.discrepancy.examined import needed_gain
 from srs_opt.discrepancy.hypothesis import Hypothesis
 from srs_opt.discrepancy.pipeline import Discrepancy
 from srs_opt.discrepancy.screen import Score
+from srs_opt.discrepancy.verdict import DESCRIBED
 from srs_opt.robot import Robot
 
 VERSION = 1
@@ -19,15 +20,16 @@ VERSION = 1
 def answer(found: Discrepancy, robot_file: Path | None) -> dict[str, Any]:
     """Return the content of discrepancy.json."""
     speaks = found.believed
-    best = found.selection.best if found.selection and speaks else None
-    rivals = found.selection.rivals if found.selection and speaks else ()
+    described = found.description if found.verdict.word == DESCRIBED else None
+    best = found.answer if speaks else None
+    rivals = found.selection.rivals if found.selection and speaks and not described else ()
     return {
         "version": VERSION,
         "verdict": found.verdict.word,
         "why": found.verdict.why,
         "believed": found.believed,
         "effects": _effects(best) if best else [],
-        "described": None,
+        "described": described.sentence if described else None,
         "lead": None,
         "remainder": None,
         "would_have_seen": None,
@@ -49,7 +51,7 @@ def answer(found: Discrepancy, robot_file: Path | None) -> dict[str, Any]:
         "candidates": candidate_rows(found),
         "corrected_robot": str(robot_file) if robot_file else None,
         "tentative_robot": None,
-        "described_robot": None,
+        "described_robot": str(robot_file) if robot_file and described else None,
         "seconds": round(found.seconds, 2),
     }
 
@@ -120,7 +122,7 @@ def candidate_rows(found: Discrepancy) -> list[dict[str, Any]]:
 def _fate(found: Discrepancy, score: Score, temper: float) -> str:
     effect = score.candidate.effect
     selection = found.selection
-    speaks = found.believed
+    speaks = found.believed and found.verdict.word != DESCRIBED
     if selection and speaks and effect in selection.best.names:
         return "chosen"
     if selection and speaks and any(effect in h.names for h in selection.rivals):
@@ -137,9 +139,9 @@ def corrected_robot(found: Discrepancy) -> Robot | None:
 
     Effects have deviations, so that a later fit that starts from this robot refits their sizes.
     """
-    if found.selection is None or found.null is None:
+    best = found.answer
+    if best is None or found.null is None:
         return None
-    best = found.selection.best
     hypothesis = best if found.believed else found.null.hypothesis
     robot = calibrated_robot(found.dataset.robot, hypothesis.fit)
     if not found.believed:

@@ -1,9 +1,9 @@
 """After an unknown gap: the term of the grammar that describes it, if one does and no other does as well.
 
-The listed effects have failed, so the gap is mostly large: calibration alone has bent the robot's values for it,
-and what the slopes there say of a term can be far from what the term does. So terms are screened about the bench's
-values too, the best of both screens are fitted to the start of a few trials, and the one that leaves least is
-exchanged for others while that helps.
+The listed effects have failed, so the gap is mostly large: calibration alone has bent the robot's values for
+it, and what the slopes there say of a term can be far from what the term does. So terms are screened about
+the bench's values too, the best of both screens are fitted to the start of a few trials, and the one that
+leaves least is exchanged for others while that helps.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 from srs_opt.calibrate.candidates import Candidate, effect_spec, entry_sd
 from srs_opt.calibrate.fit import Fit, start_point
-from srs_opt.calibrate.forms import forms_of
+from srs_opt.calibrate.forms import form_of_entry, forms_of
 from srs_opt.discrepancy.examined import needed_gain
 from srs_opt.discrepancy.hypothesis import Hypothesis
 from srs_opt.discrepancy.screen import Linearisation, Score, expected_start, screen
@@ -35,18 +35,21 @@ class Settings:
     closes : float
         Share of the gap on sealed trials.
     lead : float
-        Share of what the next best explanation leaves (the best listed effects, or a term that acts on something
-        else or elsewhere) that this one may leave at most.
+        Share of what the next best explanation leaves (the best listed effects, or a term that acts on
+        something else or elsewhere) that this one may leave at most.
     refits : int
         Terms that are fitted, the best of the screens.
     exchanges : int
         Rounds of looking for a better term from where the best one stands.
+    explained : float
+        Share of the misfit that the best may leave and need not be exchanged.
     """
 
     closes: float = 0.75
     lead: float = 0.5
-    refits: int = 8
+    refits: int = 7
     exchanges: int = 3
+    explained: float = 0.02
 
 
 DEFAULT = Settings()
@@ -83,6 +86,26 @@ class Description:
         """What the term says, with its fitted size."""
         candidate, fit = self.best.candidates[0], self.best.fit
         return self.term.sentence(effect_spec(candidate, fit.point.values), entry_sd(candidate.form, fit))
+
+
+def describe_gap(
+    search: Search, null: Hypothesis, listed: Hypothesis, sealed: Sequence[Trial]
+) -> Description | None:
+    """Return the best description of what a search of the listed effects has left unexplained.
+
+    Parameters
+    ----------
+    search : Search
+        The one that failed.
+    null, listed : Hypothesis
+        Calibration alone, and the best set of listed effects.
+    """
+    robot = search.experiment.model.robot
+    present = [Candidate(form_of_entry(e)).label for e in robot.effects]
+    terms = terms_of(robot.links, present)
+    experiment = search.experiment.with_generic_terms()
+    own = Search(experiment, search.base, terms, search.trials, search.seed, search.report, search.quick)
+    return describe(own, null.fit, listed.fit, sealed)
 
 
 def terms_of(links: int, present: Sequence[str] = ()) -> tuple[Candidate, ...]:
@@ -143,7 +166,7 @@ def _fitted(search: Search, null: Fit, settings: Settings) -> list[Hypothesis]:
             attempt(lin, score)
     for _ in range(settings.exchanges):
         leader = min(found.values(), key=_left, default=None)
-        if leader is None:
+        if leader is None or _left(leader) < settings.explained * _left(first):
             break
         lin = brief.linearise(leader.fit)
         others = [c for c in search.candidates if c.label not in found]

@@ -14,6 +14,7 @@ from srs_opt.calibrate.forms import form_of_entry
 from srs_opt.calibrate.model import Model
 from srs_opt.calibrate.noise import noise_of
 from srs_opt.discrepancy.alike import Pair, alike_pairs
+from srs_opt.discrepancy.describe import Description, describe_gap
 from srs_opt.discrepancy.design import NextExperiment, next_experiment, rivals_of
 from srs_opt.discrepancy.examined import Examined
 from srs_opt.discrepancy.hypothesis import Hypothesis
@@ -24,6 +25,7 @@ from srs_opt.discrepancy.search import Search
 from srs_opt.discrepancy.select import Selection, select
 from srs_opt.discrepancy.split import LEAST_OPEN, Split, few_and_brief, split_trials
 from srs_opt.discrepancy.verdict import (
+    DESCRIBED,
     DETECTED,
     NAMED,
     NAMED_IN_PART,
@@ -35,6 +37,7 @@ from srs_opt.discrepancy.verdict import (
     judge,
 )
 from srs_opt.measurement.records import DataSet
+from srs_opt.model.effects.generic import TERMS
 from srs_opt.parallel import HERE, Executor
 
 
@@ -55,6 +58,8 @@ class Discrepancy:
         The screen about calibration alone.
     gap : Gap or None
     next_experiment : NextExperiment or None
+    description : Description or None
+        What the grammar's terms say of a gap that no listed effect explains, believed or not.
     sd_m : float
         Noise as estimated from the tracks.
     seconds : float
@@ -76,11 +81,19 @@ class Discrepancy:
     fitted: tuple[Hypothesis, ...] = ()
     tried: frozenset[str] = frozenset()
     alike: tuple[Pair, ...] = ()
+    description: Description | None = None
 
     @property
     def believed(self) -> bool:
         """Whether the best set of effects is taken for what is missing, or for a part of it."""
-        return self.verdict.word in (NAMED, NAMED_IN_PART, ONE_OF)
+        return self.verdict.word in (NAMED, NAMED_IN_PART, DESCRIBED, ONE_OF)
+
+    @property
+    def answer(self) -> Hypothesis | None:
+        """The best set of effects; a description where that is the answer."""
+        if self.verdict.word == DESCRIBED and self.description is not None:
+            return self.description.best
+        return self.selection.best if self.selection else None
 
 
 def find_discrepancy(
@@ -153,6 +166,13 @@ def _examine(
     tell("opening the sealed trials")
     gap = open_seal(experiment, first.fit, best.hypothesis.fit, split.sealed, search.seed)
     verdict = judge(null, best, selection, gap, at_odds, restricted=restricted)
+    description = None
+    if verdict.word == UNKNOWN and not at_odds and not restricted:
+        tell(f"describing the gap with the {len(TERMS)} terms of the grammar")
+        description = describe_gap(search, first, best.hypothesis, split.sealed)
+    if description is not None and not description.why_not:
+        verdict = Verdict(DESCRIBED, f"{description.sentence}; no listed effect does that")
+        gap = description.gap
     following = None
     if verdict.word in (ONE_OF, UNKNOWN) and not at_odds:
         following = next_experiment(experiment, rivals_of(selection, fitted), split.open)
@@ -173,6 +193,7 @@ def _examine(
         tuple(fitted),
         frozenset(search.tried),
         alike_pairs(null.linearisation, search.candidates),
+        description,
     )
 
 

@@ -80,7 +80,7 @@ class Search:
         self.candidates, self.trials = tuple(candidates), tuple(trials)
         self.functions = ResidualFunctions.of(self.trials)
         self.seed = seed
-        self._report = report or (lambda message: None)
+        self.report = report or (lambda message: None)
         self.quick = tuple(quick) or self.trials
         self.deepest = DEEPEST
         self._fits: dict[tuple[frozenset[str], bool], Hypothesis] = {}
@@ -122,7 +122,7 @@ class Search:
             return known
         label = " + ".join(c.label for c in candidates)
         on = f"the start of {len(trials)} trials" if quick else f"{len(trials)} trials"
-        self._report(f"refit on {on}: {label}" if label else "calibration alone")
+        self.report(f"refit on {on}: {label}" if label else "calibration alone")
         try:
             found = fit_hypothesis(
                 self.experiment, self.base, candidates, start, trials, iterations, beat, near, rough=quick
@@ -247,7 +247,7 @@ class Search:
         """
         if self.quick == self.trials:
             return null, False
-        brief = Search(self.experiment, self.base, self.candidates, self.quick, self.seed, self._report)
+        brief = Search(self.experiment, self.base, self.candidates, self.quick, self.seed, self.report)
         brief.deepest = DEEPEST_BRIEF
         brief._fits = {(names, False): h for (names, quick), h in self._fits.items() if quick}
         first = brief.calibrate(null.hypothesis.fit.point)

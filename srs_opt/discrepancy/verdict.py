@@ -11,7 +11,7 @@ from srs_opt.discrepancy.select import Selection
 
 DETECTED = 0.05
 NO_GAP, NAMED, ONE_OF, UNKNOWN, NOT_TESTABLE = "no_gap", "named", "one_of", "unknown", "not_testable"
-NAMED_IN_PART = "named_in_part"
+NAMED_IN_PART, DESCRIBED = "named_in_part", "described"
 
 
 @dataclass(frozen=True)

@@ -1,10 +1,10 @@
 """Generic effects: what is in no list, described by terms of a grammar.
 
-A term says what acts (friction along or across the wheels, load, mass, force, moment, the wheels' direction;
-a segment's gain or time; the camera), on what it depends (nothing, direction of motion, speed, curvature, place
-on the body or in the room, side, neighbours, time, pressure), and where it sits: all links or segments, or
-any one. Each is an `Effect` as those of the library are, named ``generic_...``, so that a robot file can hold it.
-They are asked only after the listed effects have failed.
+A term says what acts (friction along or across the wheels, load, mass, force, moment, the wheels'
+direction; a segment's gain or time; the camera), on what it depends (nothing, direction of motion, speed,
+curvature, place on the body or in the room, side, neighbours, time, pressure), and where it sits: all links
+or segments, or any one. Each is an `Effect` as those of the library are, named ``generic_...``, so that a
+robot file can hold it. They are asked only after the listed effects have failed.
 """
 
 from __future__ import annotations
@@ -163,6 +163,7 @@ def _p(name: str, unit: str, typical: float, lower: float | None = None) -> Effe
     return EffectParameter(name, unit, typical, lower)
 
 
+_AT = {FORCE: "on", LOAD: "of"}
 _LOOK = {
     ALONG: "tow the unpowered robot, and turn its wheels by hand one after the other",
     ACROSS: "drag the wheel pairs sideways one after the other and read the force",
@@ -188,7 +189,7 @@ class _Entry:
 
     def term(self) -> Term:
         place = next((p.name for p in self.parameters if p.name in ("link", "segment")), None)
-        where = f" of one {place}" if place else ""
+        where = f" {_AT.get(self.acts, 'of')} one {place}" if place else ""
         what = f"{self.acts}{where}, {self.depends}" if self.depends else f"{self.acts}{where}"
         effect = Effect(
             f"generic_{self.name}", self.kind, self.parameters, what=what, look=_LOOK[self.acts], **self.hooks
@@ -205,7 +206,8 @@ _ENTRIES = (
     _Entry("along_link", "ground", ALONG, "", (_p("excess", "", 2.0, -1), link()),
            "link {link} rolls {size} times as hard as the others",
            _along(lambda e, s: 1 + e["excess"]), _FACTOR),
-    _Entry("along_direction_link", "ground", ALONG, "by direction of motion", (_p("excess", "", 2.0, -1), link()),
+    _Entry("along_direction_link", "ground", ALONG, "by direction of motion",
+           (_p("excess", "", 2.0, -1), link()),
            "link {link} rolls backwards {size} times as hard as forwards",
            _along(lambda e, s: 1 + e["excess"] * (1 - _sign(s.along)) / 2), _FACTOR),
     _Entry("along_speed_link", "ground", ALONG, "with speed", (_p("damping", "N s/m", 0.2, 0), link()),
@@ -219,16 +221,16 @@ _ENTRIES = (
            _along(lambda e, s: 1 + e["per_curvature"] * ca.fabs(s.curvature)), _PERCENT),
     _Entry("along_place", "room", ALONG, "with place in the room",
            (_p("per_m", "1/m", 1.0, 0), Direction("direction", "rad", 0.0)),
-           "rolling resistance grows across the room towards {direction} rad, by {size} of it per metre",
+           "rolling resistance grows towards {direction} rad in the room, by {size} of it per metre",
            _along(lambda e, s: 1 + e["per_m"] * _towards(e, s)), _PERCENT),
     _Entry("along_edge", "room", ALONG, "with place in the room",
            (_p("excess", "", 1.5, 0), Direction("direction", "rad", 0.0), Scale("edge_m", "m", 0.1)),
-           "rolling resistance is {size} times as large beyond a line {edge_m} m from the room's origin towards "
-           "{direction} rad",
+           "rolling resistance is {size} times as large beyond a line {edge_m} m from the room's origin "
+           "towards {direction} rad",
            _along(lambda e, s: 1 + e["excess"] * _beyond_edge(e, s)), _FACTOR),
     _Entry("along_grain", "room", ALONG, "with direction in the room",
            (_p("excess", "", 0.5, 0), Direction("direction", "rad", 0.0)),
-           "rolling towards {direction} rad in the room is harder than on average, by {size}; back it is easier",
+           "rolling towards {direction} rad in the room is {size} harder, and back as much easier",
            _along(lambda e, s: 1 + e["excess"] * _with_grain(e, s)), _PERCENT),
     # friction across the wheels
     _Entry("across_link", "ground", ACROSS, "", (_p("excess", "", 0.6, -1), link()),
@@ -249,7 +251,7 @@ _ENTRIES = (
            _across(lambda e, s: 1 + e["per_curvature"] * ca.fabs(s.curvature)), _PERCENT),
     _Entry("across_place", "room", ACROSS, "with place in the room",
            (_p("per_m", "1/m", 0.5, 0), Direction("direction", "rad", 0.0)),
-           "friction across the wheels grows across the room towards {direction} rad, by {size} of it per metre",
+           "friction across the wheels grows towards {direction} rad in the room, by {size} of it per metre",
            _across(lambda e, s: 1 + e["per_m"] * _towards(e, s)), _PERCENT),
     # load, mass
     _Entry("load_link", "ground", LOAD, "", (_p("extra_n", "N", 0.15), link()),
@@ -262,11 +264,13 @@ _ENTRIES = (
            "the load on the wheels {grows} with curvature, by {amount} of it per 1/m",
            _on_both(lambda e, s: 1 + e["per_curvature"] * ca.fabs(s.curvature)), _PERCENT),
     # forces, moments
-    _Entry("force_link", "ground", FORCE, "", (_p("along_n", "N", 0.02), Component("across_n", "N", 0.02), link()),
+    _Entry("force_link", "ground", FORCE, "",
+           (_p("along_n", "N", 0.02), Component("across_n", "N", 0.02), link()),
            "a steady force acts on link {link}: {size} along it and {across_n} N to its left",
            {"link_force": _own_force}, _MN),
     _Entry("force_place_link", "room", FORCE, "with place in the room",
-           (_p("stiffness", "N/m", 0.1), Component("pull_x_n", "N", 0.03), Component("pull_y_n", "N", 0.03), link()),
+           (_p("stiffness", "N/m", 0.1), Component("pull_x_n", "N", 0.03),
+            Component("pull_y_n", "N", 0.03), link()),
            "link {link} is held by something elastic fixed in the room: {size}, with {pull_x_n} and "
            "{pull_y_n} N at the room's origin",
            {"link_force": _spring}, (0.0, 1.0, "N/m")),
@@ -309,7 +313,7 @@ _ENTRIES = (
            {"slowness": lambda e, a: ca.fmax(1 + e["per_s"] * a.time_s, LEAST), "timed": True}, _PERCENT),
     # camera
     _Entry("camera_lens", "measurement", CAMERA, "with place in the room", (_p("per_m2", "1/m^2", 0.05),),
-           "the picture is stretched with the square of the distance from its origin, by {size} per square metre",
+           "the picture is stretched with the square of the distance from its origin, by {size} per m^2",
            {"camera": _lens}, _PERCENT),
     _Entry("camera_clock", "clock", CAMERA, "with time", (_p("rate", "", 0.015),),
            "the camera's clock and the valves' part by {size} of the time",
