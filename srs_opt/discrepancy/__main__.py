@@ -97,7 +97,7 @@ def run(options: argparse.Namespace) -> Answer:
 
 def _written(options: argparse.Namespace, found: Discrepancy, maze: Maze | None) -> Answer:
     """Write the corrected robot and the report, whose pictures simulate once more."""
-    from srs_opt.discrepancy.answer import answer, corrected_robot
+    from srs_opt.discrepancy.answer import DESCRIBED_FILE, answer, corrected_robot
     from srs_opt.discrepancy.report import write_report
     from srs_opt.files import write_json
     from srs_opt.robot import save_robot
@@ -105,8 +105,9 @@ def _written(options: argparse.Namespace, found: Discrepancy, maze: Maze | None)
     robot = corrected_robot(found)
     files = []
     if robot is not None:
-        name = "described_robot" if found.verdict.word == "described" else "corrected_robot"
-        files.append(save_robot(robot, options.out / f"{name}.yaml"))
+        files.append(save_robot(robot, options.out / "corrected_robot.yaml"))
+        if found.verdict.word == "described":
+            files.append(save_robot(robot, options.out / DESCRIBED_FILE))
     record = answer(found, files[0] if files else None)
     summary = _summary(found)
     further: list[Picture] = []

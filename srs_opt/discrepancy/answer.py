@@ -15,6 +15,7 @@ from srs_opt.discrepancy.verdict import DESCRIBED
 from srs_opt.robot import Robot
 
 VERSION = 1
+DESCRIBED_FILE = "described_robot.yaml"
 
 
 def answer(found: Discrepancy, robot_file: Path | None) -> dict[str, Any]:
@@ -51,7 +52,7 @@ def answer(found: Discrepancy, robot_file: Path | None) -> dict[str, Any]:
         "candidates": candidate_rows(found),
         "corrected_robot": str(robot_file) if robot_file else None,
         "tentative_robot": None,
-        "described_robot": str(robot_file) if robot_file and described else None,
+        "described_robot": str(robot_file.with_name(DESCRIBED_FILE)) if robot_file and described else None,
         "seconds": round(found.seconds, 2),
     }
 
