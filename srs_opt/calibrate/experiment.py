@@ -63,7 +63,7 @@ class Experiment:
     def with_generic_terms(self) -> Experiment:
         """Return the same trials held against the model with the terms of the grammar as its effects."""
         model = Model(self.model.robot, self.model.name, generic=True)
-        return Experiment(model, self.trials, self.sd_m, *self._rest)
+        return Experiment(model, self.trials, self.noise, *self._rest)
 
     @property
     def sd_m(self) -> float:

@@ -156,11 +156,10 @@ def _fitted(search: Search, null: Fit, settings: Settings) -> list[Hypothesis]:
             if h is not None:
                 found[label] = h
 
-    bench = replace(first.fit, point=start_point(search.base))
+    bench = replace(first, fit=replace(first.fit, point=start_point(search.base)))
     screens = []
-    for fit in (first.fit, bench):
-        lin = brief.linearise(fit)
-        screens.append([(lin, score) for score in screen(lin, search.candidates)])
+    for examined in (brief.examine(first), brief.examine(bench)):
+        screens.append([(examined.linearisation, score) for score in examined.scores])
     for lin, score in itertools.chain.from_iterable(zip(*screens)):
         if len(found) < settings.refits:
             attempt(lin, score)
@@ -168,7 +167,7 @@ def _fitted(search: Search, null: Fit, settings: Settings) -> list[Hypothesis]:
         leader = min(found.values(), key=_left, default=None)
         if leader is None or _left(leader) < settings.explained * _left(first):
             break
-        lin = brief.linearise(leader.fit)
+        lin = brief.examine(leader).linearisation
         others = [c for c in search.candidates if c.label not in found]
         for score in screen(lin, others, dropped=leader.candidates)[:2]:
             attempt(lin, score)

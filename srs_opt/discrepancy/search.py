@@ -160,7 +160,7 @@ class Search:
 
     def _under(self, noise: Noise, hypothesis: Hypothesis) -> Hypothesis:
         """Go on under another noise; return a hypothesis fitted anew."""
-        self._report(f"noise: {noise.in_words}")
+        self.report(f"noise: {noise.in_words}")
         self._earlier += self.fitted
         self.experiment = self.experiment.with_noise(noise)
         self._fits = {}
@@ -173,7 +173,7 @@ class Search:
     def examine(self, hypothesis: Hypothesis) -> Examined:
         """Linearise about a fitted hypothesis, test what is left and screen what could explain it."""
         fit = hypothesis.fit
-        lin = self.linearise(fit)
+        lin = self._linearise(fit)
         groups = self.functions.groups()
         size, columns = len(lin.coordinates), next(iter(lin.grams.values())).raw.shape[0] - 1
         total = sum_eliminated(lin.grams, 1.0)
@@ -208,8 +208,7 @@ class Search:
             self.again(h)
         return self.fitted
 
-    def linearise(self, fit: Fit) -> Linearisation:
-        """Return the normal equations at a fit, all candidates among the coordinates."""
+    def _linearise(self, fit: Fit) -> Linearisation:
         names = {c.name for c in fit.coordinates}
         others = [c for k in self.candidates for c in k.sizes if c.name not in names]
         coordinates = (*fit.coordinates, *others)

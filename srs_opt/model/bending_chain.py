@@ -75,7 +75,7 @@ class BendingChain:
         """
         model, n = self.model, self.links
         m = self.motion(y, dy, ddy, h, drive)
-        f = self.forces(m.place, m.velocity, m.cos, m.sin, drive.frame, self.kappa(y))
+        f = self.forces(m.place, m.velocity, m.cos, m.sin, drive.frame, self.chambers(drive).kappa(y))
         net_x, net_y = h * f.x - model.mass * m.acceleration[0], h * f.y - model.mass * m.acceleration[1]
         joint = self.joint_forces(net_x, net_y)
         q = self._moment(y, dy, drive) * h

@@ -269,7 +269,9 @@ def _force_slopes(chain: BendingChain, m: Motion, y: ca.SX, drive: Drive) -> _Sl
     _check_local(jacobians[:3], n)
     slopes = ca.Function("slopes", [r, v, th, frame, bend, p], [*jacobians, f.x, f.y], {"cse": True})
     place, velocity = ca.vertcat(*m.place), ca.vertcat(*m.velocity)
-    f_v, f_r, f_th, p_v, p_r, p_th, f_x, f_y = slopes(place, velocity, theta, drive.frame, chain.kappa(y), p)
+    f_v, f_r, f_th, p_v, p_r, p_th, f_x, f_y = slopes(
+        place, velocity, theta, drive.frame, chain.chambers(drive).kappa(y), p
+    )
 
     def block(matrix: ca.SX, i: int) -> ca.SX:
         return matrix[[i, n + i], [i, n + i]]
