@@ -211,6 +211,8 @@ class Drive:
         planned = self._gait_by_plan(self.state)
         enough_m = self.foresight.enough_m
         if planned is not None and self._room_m(self.state, planned) > enough_m:
+            if planned > self.problem.motion.rest:
+                return self._own_cycle(planned)
             return by_plan(self.problem, where, self.learned, planned)
         tried: list[Choice] = []
         second, most_m = None, LEAST_ROOM * self.problem.robot.length_m
@@ -226,6 +228,16 @@ class Drive:
             if room_m > most_m:
                 second, most_m = choice, room_m
         return second or replace(tried[0], clearance_m=-math.inf)
+
+    def _own_cycle(self, number: int) -> Choice:
+        """Return a cycle that was made for the plan, which says what it should do."""
+        k = self.plan.gaits.index(number)
+        c, s = math.cos(self.ends[k, 2]), math.sin(self.ends[k, 2])
+        dx, dy, turn = self.ends[k + 1, :3] - self.ends[k, :3]
+        moved = np.array([[[0.0, 0.0, 0.0], [c * dx + s * dy, c * dy - s * dx, turn]]])
+        common = replace(self.learned, own={})
+        predicted = common.apply(moved, self.problem.joints.gait(number).period_s)
+        return Choice(number, predicted[0, -1], math.inf, 0.0)
 
     def _room_m(self, state: Array, gait: int) -> float:
         """Return the least clearance over a cycle with any friction that the robot may have."""
@@ -264,7 +276,7 @@ class Drive:
 
     def _cycle(self, index: int) -> str | None:
         """Play one cycle; return what ended the drive, if anything."""
-        gait = self.problem.gaits.gaits[index].gait
+        period_s = self.problem.joints.gait(index).period_s
         begin, before = self.state[:3].copy(), self.state
         cycle = self.problem.joints.timeline(self.before, index)
         plain = self.problem.joints.is_plain(self.before, index)
@@ -283,7 +295,9 @@ class Drive:
         c, s = math.cos(begin[2]), math.sin(begin[2])
         dx, dy, turn = self.state[:3] - begin
         observed = np.array([c * dx + s * dy, c * dy - s * dx, turn])
-        self.learned = self.learned.update(self.predicted, observed, gait.period_s, index)
+        self.learned = self.learned.update(
+            self.predicted, observed, period_s, self.problem.motion.row(index)
+        )
         node = nearest_node(self.reference, self.state[:3], self.node)
         self.idle = 0 if node > self.node else self.idle + 1
         self.node = node

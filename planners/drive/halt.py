@@ -30,7 +30,7 @@ def halt(foresight: Foresight, state: NDArray[np.float64], before: int) -> Timel
     vent = joints.vent(before, COAST_S)
     best, most_m = vent, foresight.least_room_m(state, vent)
     forward = float(state[3]) > 0
-    possible = np.flatnonzero(problem.motion.allowed[before])
+    possible = np.flatnonzero(problem.motion.may_follow(before))
     ahead = np.array([entry.speed_m_s > 0 for entry in problem.gaits.gaits]) == forward
     brakes, steers = possible[~ahead[possible]], possible[ahead[possible]]
     # braking for one cycle, then for two, then steering away: what is looked at last goes farthest

@@ -130,10 +130,11 @@ class _Branch:
 def reference_of(problem: Problem, plan: Plan) -> Reference:
     """Return the plan's nodes; the course is the direction of travel, free of the gait's swing."""
     c = plan.certificate
-    periods = problem.motion.period_s[list(plan.gaits)]
+    periods = problem.motion.periods(plan.gaits)
     ends = np.concatenate([[0.0], np.cumsum(periods)])
     steady = problem.motion.steady_speed_m_s
-    way = list(plan.gaits)
+    played = problem.motion.rows(plan.gaits)
+    way = list(played)
     if len(way) > 1 and steady[way[-1]] * steady[way[-2]] < 0:
         way[-1] = way[-2]  # the last gait only brakes: the robot still travels as in the cycle before
     gaits = [problem.motion.rest, *way]
@@ -149,7 +150,7 @@ def reference_of(problem: Problem, plan: Plan) -> Reference:
     cycle = np.minimum(np.searchsorted(ends, times, side="right") - 1, len(plan.gaits) - 1)
     speed = np.where(backwards[cycle], -speed, speed)
     pose = np.stack([x, y, np.interp(times, ends, course)], axis=1)
-    reference = Reference(pose, speed, c.time_s[-1] - times, np.array(plan.gaits)[cycle])
+    reference = Reference(pose, speed, c.time_s[-1] - times, np.array(played)[cycle])
     return _beyond(reference, problem.robot.length_m)
 
 
@@ -235,17 +236,17 @@ def _grow(
     offset = _offset(reference, place, speed, problem.robot.length_m)
     order = np.argsort(offset, kind="stable")[: 3 * BEAM]
     order = np.union1d(order, _planned(reference, where.pose))  # which nothing may resemble
-    order = order[motion.allowed[where.gait, order]]
+    order = order[motion.may_follow(where.gait)[order]]
     if branch.first is None:
         order = np.setdiff1d(order, list(barred))
-    lines = body_in_room(motion.body[where.gait, order, 1::_THIN], pose[order, 1::_THIN])
+    lines = body_in_room(motion.body[motion.row(where.gait), order, 1::_THIN], pose[order, 1::_THIN])
     room, length = _room(problem, lines), problem.robot.length_m
     grown = []
     for gait, clearance in zip(map(int, order), map(float, room)):
         arrival = arrival_index(problem.goal, pose[gait])
         part = 1.0 if arrival is None else arrival / SAMPLES
         lack = min(max(1 - clearance / (AIR * length), 0.0), 1.0)
-        cost = branch.cost + AIR_UNITS * lack**2 + CHANGE_UNITS * (gait != where.gait)
+        cost = branch.cost + AIR_UNITS * lack**2 + CHANGE_UNITS * (gait != motion.row(where.gait))
         cost += part * float(motion.period_s[gait]) / UNIT_S
         cost += CONTACT_UNITS * (1 + lack) if clearance <= CONTACT * length else 0.0
         first = branch.first or Choice(gait, local[gait, -1], clearance, 0.0)

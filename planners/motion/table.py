@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -10,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planners.motion.bending import Bending
-from planners.motion.valves import Joints
+from planners.motion.valves import Joint, Joints
 
 STILL = 0.25  # body widths per cycle; what moves less has no direction of travel
 SAMPLES = 16  # intervals per cycle at which pose and body are kept
@@ -54,6 +55,8 @@ class MotionTable:
     body_width_m : float
     joints : Joints
         How a cycle follows another; where none can, the arrays mean nothing.
+    origin : tuple of int
+        The gait that each cycle made for one plan has come from; it leaves the robot much as that gait does.
     """
 
     names: tuple[str, ...]
@@ -65,6 +68,7 @@ class MotionTable:
     body: NDArray[np.float32]
     body_width_m: float
     joints: Joints
+    origin: tuple[int, ...] = ()
 
     @property
     def rest(self) -> int:
@@ -76,8 +80,32 @@ class MotionTable:
         """Number of gaits."""
         return len(self.names)
 
+    def row(self, number: int) -> int:
+        """Return the row of what is played: itself for gaits and rest, of its gait for a plan's own cycle."""
+        return number if number <= self.rest else self.origin[number - self.rest - 1]
+
+    def rows(self, numbers: Sequence[int]) -> tuple[int, ...]:
+        """Return the gaits of cycles: of those made for one plan, what they have come from."""
+        return tuple(self.row(number) for number in numbers)
+
+    def periods(self, numbers: Sequence[int]) -> Array:
+        """Return the durations of cycles."""
+        return np.array([self.joints.gait(number).period_s for number in numbers])
+
+    def may_follow(self, before: int) -> NDArray[np.bool_]:
+        """Return which gaits (n,) can follow a cycle."""
+        allowed = self.allowed[self.row(before)]
+        if before <= self.rest:
+            return np.asarray(allowed)
+        return allowed & [self.joints.joint(before, now) is not None for now in range(self.size)]
+
+    def with_own(self, own: Sequence[Joint], origin: Sequence[int]) -> MotionTable:
+        """Return the table with cycles made for one plan, and the gaits that they have come from."""
+        return replace(self, joints=self.joints.with_own(own), origin=tuple(origin))
+
     def move(self, x: float, y: float, heading: float, before: int, speed_m_s: float) -> Motion:
         """Return what a cycle of each gait does from one state, (gaits, ...)."""
+        before = self.row(before)
         low, weight = self._level(before, speed_m_s)
         tables = self.pose[before], self.speed_after_m_s[before]
         local, after = ((1 - weight) * t[:, low] + weight * t[:, low + 1] for t in tables)
@@ -87,6 +115,7 @@ class MotionTable:
         self, x: float, y: float, heading: float, before: int, speed_m_s: float, now: int
     ) -> tuple[Array, float]:
         """Return poses (SAMPLES + 1, 3) and the speed after one cycle of gait `now`."""
+        before = self.row(before)
         low, weight = self._level(before, speed_m_s)
         tables = self.pose[before, now], self.speed_after_m_s[before, now]
         local, after = ((1 - weight) * t[low] + weight * t[low + 1] for t in tables)
@@ -109,7 +138,7 @@ class MotionTable:
 
     def bodies(self, before: int, now: NDArray[np.int64] | slice, pose: Array) -> Array:
         """Return centre lines in the room, (gaits, SAMPLES + 1, points, 2), for poses of the same gaits."""
-        return body_in_room(self.body[before, now], pose)
+        return body_in_room(self.body[self.row(before), now], pose)
 
     @cached_property
     def allowed(self) -> NDArray[np.bool_]:

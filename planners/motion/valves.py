@@ -12,6 +12,7 @@ The regulator goes linearly from the pressure of the last cycle to that of the n
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -92,15 +93,22 @@ class Joint:
 class Joints:
     """How every gait of a table follows every other (n gaits; before the first is rest, number n).
 
+    Cycles made for one plan have the numbers after rest and follow each other in that order only.
+
     Parameters
     ----------
     gaits : GaitTable
         As `playable` returns it.
     limits : ValveLimits
+    own : sequence of Joint
+        Cycles made for one plan.
     """
 
-    def __init__(self, gaits: GaitTable, limits: ValveLimits = DEFAULT_LIMITS) -> None:
-        self.limits = limits
+    def __init__(
+        self, gaits: GaitTable, limits: ValveLimits = DEFAULT_LIMITS, own: Sequence[Joint] = ()
+    ) -> None:
+        self.limits, self.own = limits, tuple(own)
+        self._table = gaits
         self._gaits = [entry.gait for entry in gaits.gaits]
         self._plain = [Joint(gait, gait.pressure_kpa, 0.0) for gait in self._gaits]
         self._known: dict[tuple[int, int], Joint | None] = {}
@@ -112,6 +120,9 @@ class Joints:
 
     def joint(self, before: int, now: int) -> Joint | None:
         """Return the cycle of a gait after another (the gait's own where that will do), None if none can."""
+        if now > self.rest:
+            first = now == self.rest + 1
+            return self.own[now - self.rest - 1] if first or before == now - 1 else None
         if before == now:
             return self._plain[now]
         if (before, now) not in self._known:
@@ -126,14 +137,22 @@ class Joints:
 
     def is_plain(self, before: int, now: int) -> bool:
         """Whether the gait's own cycle is played after another gait."""
-        return self.joint(before, now) is self._plain[now]
+        return now < self.rest and self.joint(before, now) is self._plain[now]
+
+    def with_own(self, own: Sequence[Joint]) -> Joints:
+        """Return the same with cycles made for one plan."""
+        return Joints(self._table, self.limits, own)
+
+    def gait(self, number: int) -> Gait:
+        """Return what a cycle plays by itself; `number` is not rest."""
+        return self._gaits[number] if number < self.rest else self.own[number - self.rest - 1].gait
 
     def vent(self, before: int, duration_s: float) -> Timeline:
         """Return the valves of venting after a cycle: each segment's hold until they have dwelt."""
         if before == self.rest:
             return Timeline.vent(self._gaits[0].segments, duration_s, 0.0)
-        gait = self._gaits[before]
-        state, age = _end(gait)
+        gait = self.gait(before)
+        state, age = gait_end(gait)
         wait = np.array([max(0.0, self._later(self.limits.dwell_s - a)) for a in age])
         edges = np.unique([0.0, *wait, wait.max() + duration_s])
         middles = (edges[:-1] + edges[1:]) / 2
@@ -145,7 +164,7 @@ class Joints:
         if before == self.rest:
             state, age, from_kpa = [0] * gait.segments, [math.inf] * gait.segments, gait.pressure_kpa
         else:
-            (state, age), from_kpa = _end(self._gaits[before]), self._gaits[before].pressure_kpa
+            (state, age), from_kpa = gait_end(self.gait(before)), self.gait(before).pressure_kpa
         ramp_s = self.limits.ramp_s(from_kpa, gait.pressure_kpa)
         if ramp_s > gait.period_s:
             return None  # the next joint could not know where the pressure is
@@ -181,7 +200,7 @@ class Joints:
         _, first, times = min(found, key=lambda way: way[0])
         if times[0] < _SAME_S:
             first, times = -first, times[1:]
-        return gait.intervals[segment] if (first, times) == (begin, inner) else _intervals(first, times)
+        return gait.intervals[segment] if (first, times) == (begin, inner) else intervals_of(first, times)
 
     def _kept(self, wanted: list[float], last_s: float, latest_s: float) -> list[tuple[float, list[float]]]:
         """Return the ways to keep the dwell: by how long the valve stands otherwise than wanted, switches.
@@ -260,7 +279,7 @@ def _switches(gait: Gait, segment: int) -> tuple[int, list[float]]:
     return (1 if on else -1), inner
 
 
-def _end(gait: Gait) -> tuple[list[int], list[float]]:
+def gait_end(gait: Gait) -> tuple[list[int], list[float]]:
     """Return every segment's valve state at the cycle's end, and for how long it has stood."""
     states, ages = [], []
     for segment in range(gait.segments):
@@ -270,7 +289,7 @@ def _end(gait: Gait) -> tuple[list[int], list[float]]:
     return states, ages
 
 
-def _intervals(first: int, switches: list[float]) -> tuple[Interval, ...]:
+def intervals_of(first: int, switches: list[float]) -> tuple[Interval, ...]:
     """Return the on-intervals of a valve that begins a cycle in a state and switches at times inside it."""
     on = switches if first < 0 else [0.0, *switches]
     pairs = [(on[k], on[k + 1]) for k in range(0, len(on) - 1, 2)]

@@ -10,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from planners.plan.certify import Certificate
+from planners.search.price import gait_air_j
 from planners.search.problem import Problem
 
 Status = Literal["solved", "infeasible", "not_found", "timeout"]
@@ -57,7 +58,7 @@ class Plan:
 
     def air_j(self, problem: Problem) -> float:
         """Return the energy of the air that the plan's cycles take."""
-        return float(problem.tariff.air_j[list(self.gaits)].sum())
+        return sum(gait_air_j(problem.robot, problem.joints.gait(number)) for number in self.gaits)
 
     def steps(self, problem: Problem) -> list[dict[str, Any]]:
         """Return the gaits in order, each with the number of cycles that it is held."""
@@ -68,7 +69,7 @@ class Plan:
                 "cycles": len(list(run)),
                 "reverse": entries[gait].speed_m_s < 0,
             }
-            for gait, run in groupby(self.gaits)
+            for gait, run in groupby(problem.motion.rows(self.gaits))
         ]
 
     def path(self) -> list[dict[str, float]]:

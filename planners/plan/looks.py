@@ -120,7 +120,7 @@ def _closed_loop(problem: Problem, plan: Plan, tolerance: Tolerance) -> float:
     root, c = at_rest(problem), plan.certificate
     begins = [root.state, *c.states[:-1]]
     before = [root.gait, *plan.gaits[:-1]]
-    ends_s = np.cumsum(problem.motion.period_s[list(plan.gaits)])
+    ends_s = np.cumsum(problem.motion.periods(plan.gaits))
     keys, searches = [], []
     for k, (state, b, gait) in enumerate(zip(begins, before, plan.gaits)):
         if k and ends_s[k - 1] >= c.time_s[-1]:

@@ -26,8 +26,9 @@ def plan_program(problem: Problem, plan: Plan) -> Program:
         if key not in known:
             joint = problem.joints.joint(before, gait)
             assert joint is not None  # it is part of a plan
-            entry = problem.gaits.gaits[gait]
-            name = entry.name if plain else f"{entry.name} joining"
+            entry = problem.gaits.gaits[problem.motion.row(gait)]
+            made = f"refined {gait - problem.motion.rest}" if gait > problem.motion.rest else "joining"
+            name = entry.name if plain else f"{entry.name} {made}"
             known[key] = len(entries)
             entries.append((name, joint.gait, entry.speed_m_s, entry.turn_rate_rad_s))
         cycles.append(known[key])

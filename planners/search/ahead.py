@@ -62,5 +62,5 @@ def _by_place(problem: Problem, end: Array) -> tuple[Array, Array]:
 
 def motion_lines(problem: Problem, before: int, pose: Array, gaits: NDArray[np.int64] | slice) -> Array:
     """Return thinned centre lines (gaits, samples, points, 2) of a cycle of some gaits after another."""
-    body = problem.motion.body[before, gaits, 2::2, ::4]
+    body = problem.motion.body[problem.motion.row(before), gaits, 2::2, ::4]
     return body_in_room(body, pose[gaits, 2::2])

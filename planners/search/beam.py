@@ -126,7 +126,7 @@ class BeamSearch:
         move = motion.move(state[0], state[1], state[2], before, state[3])
         left = remaining(problem, move.pose[:, -1], move.speed_m_s, s.by_heading)
         order = np.argsort(left + motion.period_s, kind="stable")
-        order = order[(left[order] < BLOCKED_S / 2) & problem.motion.allowed[before, order]]
+        order = order[(left[order] < BLOCKED_S / 2) & motion.may_follow(before)[order]]
         offers: list[_Offer] = []
         for gaits in (order[:FIRST_LOOK], order[FIRST_LOOK:]):
             lines = motion_lines(problem, before, move.pose, gaits)

@@ -139,7 +139,7 @@ class LatticeSearch:
         room = problem.body.estimate(lines).min(axis=1)
         left = remaining(problem, move.pose[:, -1], move.speed_m_s, s.by_heading)
         possible = (room > problem.margin_m - problem.field.error_m) & (left < BLOCKED_S / 2)
-        possible &= problem.motion.allowed[before]
+        possible &= motion.may_follow(before)
         air = np.clip(1 - (room - problem.margin_m) / problem.motion.body_width_m, 0.0, 1.0)
         price = problem.tariff.of_cycles(self._gaits, move.pose, room - problem.margin_m)
         spent = self._tree.spent[node] + price

@@ -57,7 +57,7 @@ class Memory:
         if number in self.arrived:
             return number
         before = tree.gait[number]
-        if not problem.motion.allowed[before, gait]:
+        if not problem.motion.may_follow(before)[gait]:
             return TOO_NEAR
         (cycle,) = problem.simulate_all([(tree.cycle[number].state, before, gait)])
         if cycle is None:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from srs_opt.gait_opt.goal import air_work_j, chamber_volume_m3
+from srs_opt.gait import Gait
 from srs_opt.gait_opt.table import GaitTable
 from srs_opt.robot import Robot
 
@@ -47,8 +48,7 @@ class Tariff:
     def of(price: Price, robot: Robot, table: GaitTable) -> Tariff:
         """Return the prices of a table's gaits."""
         gaits = [entry.gait for entry in table.gaits]
-        volume = chamber_volume_m3(robot)
-        air = [air_work_j(sum(map(len, g.intervals)), g.pressure_kpa, volume) for g in gaits]
+        air = [gait_air_j(robot, gait) for gait in gaits]
         speed = [abs(entry.speed_m_s) for entry in table.gaits]
         return Tariff(
             price, np.array([g.period_s for g in gaits]), np.array(air), np.array(speed), robot.body_width_m
@@ -106,3 +106,8 @@ class Tariff:
     def _nearness(self, spare_m: Array) -> Array:
         """Return the factor by which nearness to walls makes dearer."""
         return 1 + NEAR_FACTOR * np.clip(1 - spare_m / (NEAR_WIDTHS * self.body_width_m), 0.0, 1.0)
+
+
+def gait_air_j(robot: Robot, gait: Gait) -> float:
+    """Return the energy of the air that a cycle of a gait takes."""
+    return float(air_work_j(sum(map(len, gait.intervals)), gait.pressure_kpa, chamber_volume_m3(robot)))

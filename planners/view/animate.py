@@ -46,7 +46,7 @@ def save_animation(path: Path, problem: Problem, plan: Plan, execution: Executio
     draw_maze(axes, problem.maze)
     axes.set_xlabel("")
     axes.set_ylabel("")
-    colors = gait_colors(problem, (*plan.gaits, *(execution.gaits if execution else ())))
+    colors = gait_colors(problem, problem.motion.rows((*plan.gaits, *(execution.gaits if execution else ()))))
     body = Polygon(np.zeros((3, 2)), closed=True, edgecolor="#202020", linewidth=0.6, zorder=5)
     axes.add_patch(body)
     (trail,) = axes.plot([], [], color="#202020", linewidth=0.8, zorder=4)
@@ -71,9 +71,10 @@ def save_animation(path: Path, problem: Problem, plan: Plan, execution: Executio
 
 def _motion(plan: Plan, problem: Problem, execution: Execution | None) -> tuple[Any, Any, Any, Any]:
     """Return times, poses, centre lines and gait indices."""
+    rows = problem.motion.rows
     if execution is None:
         c = plan.certificate
-        return c.time_s, c.pose, c.lines, np.array(plan.gaits)[c.cycle]
-    ends = np.cumsum(problem.motion.period_s[list(execution.gaits)])
+        return c.time_s, c.pose, c.lines, np.array(rows(plan.gaits))[c.cycle]
+    ends = np.cumsum(problem.motion.periods(execution.gaits))
     cycle = np.searchsorted(ends, execution.time_s).clip(0, len(execution.gaits) - 1)
-    return execution.time_s, execution.pose, execution.lines, np.array(execution.gaits)[cycle]
+    return execution.time_s, execution.pose, execution.lines, np.array(rows(execution.gaits))[cycle]

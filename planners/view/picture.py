@@ -86,11 +86,12 @@ def draw_swept(axes: Axes, problem: Problem, plan: Plan) -> dict[int, Any]:
     from matplotlib.patches import PathPatch
     from matplotlib.path import Path as Outline
 
-    colors = gait_colors(problem, plan.gaits)
+    played = problem.motion.rows(plan.gaits)
+    colors = gait_colors(problem, played)
     c = plan.certificate
     labelled: set[int] = set()
     first = 0
-    for gait, run in groupby(plan.gaits):
+    for gait, run in groupby(played):
         count = len(list(run))
         inside = (c.cycle >= first) & (c.cycle < first + count)
         first += count
@@ -127,7 +128,7 @@ def draw_clearance(axes: Axes, problem: Problem, plan: Plan, colors: dict[int, A
     # the certificate stops at a lower bound where that is enough: it would draw steps that are none
     room = 1e3 * clearances(problem, c.lines, SHOWN_CLEARANCE_M).clip(max=SHOWN_CLEARANCE_M)
     first = 0
-    for gait, run in groupby(plan.gaits):
+    for gait, run in groupby(problem.motion.rows(plan.gaits)):
         count = len(list(run))
         inside = (c.cycle >= first) & (c.cycle < first + count)
         first += count

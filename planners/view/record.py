@@ -44,7 +44,7 @@ def save_motion(path: Path, problem: Problem, plan: Plan, execution: Execution |
 def motion_record(problem: Problem, plan: Plan, execution: Execution | None = None) -> dict[str, Any]:
     """Return the JSON object of motion.json (schema: motion.schema.json)."""
     c = plan.certificate
-    starts_s = np.concatenate([[0.0], np.cumsum(problem.motion.period_s[list(plan.gaits)])[:-1]])
+    starts_s = np.concatenate([[0.0], np.cumsum(problem.motion.periods(plan.gaits))[:-1]])
     rest = problem.motion.rest
     planned = list(zip((rest, *plan.gaits), plan.gaits, starts_s))
     runs = [_run("planned", problem, planned, c.time_s, c.pose, c.lines)]
@@ -59,12 +59,13 @@ def motion_record(problem: Problem, plan: Plan, execution: Execution | None = No
             _run("driven", problem, list(zip(before, e.gaits, e.starts_s)), e.time_s, e.pose, e.lines)
             | {"outcome": e.reason, "halts": [_halt(*halt) for halt in e.halts]}
         )
-    used = sorted({gait for run in runs for _, gait, _ in run["cycles"]})
+    row = problem.motion.row
+    used = sorted({row(gait) for run in runs for _, gait, _ in run["cycles"]})
     pairs = {(before, gait) for run in runs for before, gait, _ in run["cycles"]}
     joining = sorted(pair for pair in pairs if not problem.joints.is_plain(*pair))
     for run in runs:
         run["cycles"] = [
-            [used.index(gait), start, joining.index((before, gait)) if (before, gait) in joining else None]
+            [used.index(row(gait)), start, joining.index((before, gait)) if (before, gait) in joining else None]
             for before, gait, start in run["cycles"]
         ]
     limits = problem.joints.limits
@@ -82,11 +83,12 @@ def motion_record(problem: Problem, plan: Plan, execution: Execution | None = No
 
 
 def _joining(problem: Problem, before: int, gait: int) -> dict[str, Any]:
-    """Return the cycle with which a gait begins after another (or rest)."""
+    """Return the cycle with which a gait begins after another (or rest), or one made for the plan."""
     joint = problem.joints.joint(before, gait)
     assert joint is not None  # it has been played
-    after = None if before == problem.motion.rest else problem.gaits.gaits[before].name
-    record = {"gait": problem.gaits.gaits[gait].name, "after": after, **joint.gait.record()}
+    row, entries = problem.motion.row, problem.gaits.gaits
+    after = None if before == problem.motion.rest else entries[row(before)].name
+    record = {"gait": entries[row(gait)].name, "after": after, **joint.gait.record()}
     return record | {"from_kpa": joint.from_kpa, "ramp_s": round(joint.ramp_s, 6)}
 
 

@@ -78,7 +78,7 @@ def certify(run: Integrator, task: Task, plan: ValvePlan) -> tuple[Certificate, 
     fine = run.run(plan.timeline(), task.start.state, TOLERANCE_M_S / FINER**2)
     apart = (coarse.final[:3] - fine.final[:3]) * (1.0, 1.0, 0.1)
     error = float(np.hypot(*apart[:2]) + abs(apart[2])) / RATIO
-    shot = Shot(plan, fine.time_s, _states(run, fine))
+    shot = Shot(plan, fine.time_s, seen_states(run, fine))
     rows = RowMaker(run, task, inside=1.0)
     end = float(rows.end_values(shot).min())
     space = float(rows.space_values(shot, np.arange(fine.time_s.size)).min(initial=np.inf))
@@ -102,8 +102,8 @@ def certify(run: Integrator, task: Task, plan: ValvePlan) -> tuple[Certificate, 
     return certificate, fine
 
 
-def _states(run: Integrator, path: Trajectory) -> np.ndarray:
-    """Return the states (n, nx) that constraints look at."""
+def seen_states(run: Integrator, path: Trajectory) -> np.ndarray:
+    """Return the states (n, nx) that constraints look at: pose, velocity and curvatures."""
     states = np.zeros((path.time_s.size, run.states))
     states[:, :3], states[:, 3:6] = path.pose, path.velocity
     states[:, run.layout.kappa] = path.kappa

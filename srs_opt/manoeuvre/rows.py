@@ -175,22 +175,35 @@ class RowMaker:
 
     def points(self, shot: Shot, looked: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
         """Return the centre lines (n, points, 2) in the room and their slopes (n, points, 2, m)."""
-        states = shot.states[looked]
-        kappa, (x, y, heading) = states[:, self.run.layout.kappa], states[:, :3].T
-        line = centre_lines(self.run, kappa)
-        bx, by = rotate(heading[:, None], line[..., 0], line[..., 1])
-        points = np.stack([x[:, None] + bx, y[:, None] + by], axis=-1)
-        if shot.slopes is None:
-            return points, None
-        moved = shot.slopes[looked]
-        slopes = np.repeat(moved[:, None, :2], line.shape[1], axis=1)
-        turned = np.stack([-by, bx], axis=-1)
-        slopes = slopes + turned[..., None] * moved[:, None, None, 2]
-        for k in range(kappa.shape[1]):
-            hair = np.zeros(kappa.shape[1])
-            hair[k] = _HAIR
-            bent = (centre_lines(self.run, kappa + hair) - centre_lines(self.run, kappa - hair)) / (2 * _HAIR)
-            gx, gy = rotate(heading[:, None], bent[..., 0], bent[..., 1])
-            by_kappa = moved[:, self.run.layout.kappa.start + k]
-            slopes += np.stack([gx, gy], axis=-1)[..., None] * by_kappa[:, None, None]
-        return points, slopes
+        moved = None if shot.slopes is None else shot.slopes[looked]
+        return body_points(self.run, shot.states[looked], moved)
+
+
+def body_points(
+    run: Integrator, states: np.ndarray, moved: np.ndarray | None
+) -> tuple[np.ndarray, np.ndarray | None]:
+    """Return the centre lines (n, points, 2) in the room and their slopes (n, points, 2, m).
+
+    Parameters
+    ----------
+    states : array (n, nx)
+    moved : array (n, nx, m) or None
+        Their slopes, where those of the lines are asked for.
+    """
+    kappa, (x, y, heading) = states[:, run.layout.kappa], states[:, :3].T
+    line = centre_lines(run, kappa)
+    bx, by = rotate(heading[:, None], line[..., 0], line[..., 1])
+    points = np.stack([x[:, None] + bx, y[:, None] + by], axis=-1)
+    if moved is None:
+        return points, None
+    slopes = np.repeat(moved[:, None, :2], line.shape[1], axis=1)
+    turned = np.stack([-by, bx], axis=-1)
+    slopes = slopes + turned[..., None] * moved[:, None, None, 2]
+    for k in range(kappa.shape[1]):
+        hair = np.zeros(kappa.shape[1])
+        hair[k] = _HAIR
+        bent = (centre_lines(run, kappa + hair) - centre_lines(run, kappa - hair)) / (2 * _HAIR)
+        gx, gy = rotate(heading[:, None], bent[..., 0], bent[..., 1])
+        by_kappa = moved[:, run.layout.kappa.start + k]
+        slopes += np.stack([gx, gy], axis=-1)[..., None] * by_kappa[:, None, None]
+    return points, slopes

@@ -25,6 +25,7 @@ from srs_opt.simulate.rosenbrock import step_function
 
 # Out of rest slopes err by 20 % with 2.5 ms, by 1 % with 1 ms; with coarser ones optima are 0.5 to 2 % worse
 STEP_S = 0.00125
+Born = dict[int, list[tuple[int, np.ndarray]]]
 
 
 @dataclass(frozen=True)
@@ -81,35 +82,57 @@ def shoot(run: Integrator, start: np.ndarray, plans: list[ValvePlan], step_s: fl
 
 def shoot_with_slopes(run: Integrator, start: np.ndarray, plan: ValvePlan, step_s: float = STEP_S) -> Shot:
     """Simulate a manoeuvre and differentiate it."""
-    nx = run.states
     course = _course(run, start, plan, step_s)
     found, _ = run.kernel.run([course])
     states = np.vstack([start, found[:, :, 0]])
-    jacobians = _jacobians(run, course, states)
     time = np.concatenate([[0.0], np.cumsum(course.h_s)])
-    times = plan.times()
-    m = times.size + 2
-    slopes = np.zeros((time.size, nx, m))
-    born: dict[int, list[tuple[int, np.ndarray]]] = {}
+    m = plan.switches + 2
+    born: Born = {}
     column = 0
     for segment, row in enumerate(plan.rows):
         for k, at in enumerate(row.times_s):
             if -COINCIDENT_S <= at < plan.duration_s - COINCIDENT_S:
                 node = int(np.argmin(np.abs(time - at)))
-                held = course.valve[node, segment]  # the state, in part where the pressure is lower
-                share = held / row.states[k + 1] if held else 1.0
-                jump = _jump(run, states[node], course.p, segment, share * row.states[k], held)
+                after = course.valve[node].copy()
+                # the state, in part where the pressure is lower
+                share = after[segment] / row.states[k + 1] if after[segment] else 1.0
+                before = after.copy()
+                before[segment] = share * row.states[k]
+                jump = jump_of(run, states[node], course.p, before, after)
                 born.setdefault(node, []).append((column, jump))
             column += 1
-    for node in range(time.size - 1):
-        for column, jump in born.get(node, ()):
-            slopes[node, :, column] += jump
-        jacobian = jacobians[node]
-        slopes[node + 1] = jacobian[:, :nx] @ slopes[node]
-        slopes[node + 1, :, -1] += jacobian[:, nx]
+    by_pressure = np.zeros((course.h_s.size, m))
+    by_pressure[:, -1] = 1.0
+    slopes = carried_on(run, course, states, born, by_pressure)
     # f at the end, from the last step itself: a finite difference would see the step's curvature
     slopes[-1, :, -2] = (states[-1] - states[-2]) / course.h_s[-1]
     return Shot(plan, time, states, slopes)
+
+
+def carried_on(
+    run: Integrator, course: Course, states: np.ndarray, born: Born, by_pressure: np.ndarray
+) -> np.ndarray:
+    """Return the derivatives of all states (n + 1, nx, m) by m unknowns.
+
+    Parameters
+    ----------
+    course : Course
+    states : array (n + 1, nx)
+        Where it leads, the start first.
+    born : dict of node to list of (unknown, jump (nx,))
+        What an unknown does to the state at the instant that it moves.
+    by_pressure : array (n, m)
+        How much an unknown changes the course's pressure in each step.
+    """
+    nx, m = run.states, by_pressure.shape[1]
+    jacobians = _jacobians(run, course, states)
+    slopes = np.zeros((len(states), nx, m))
+    for node, jacobian in enumerate(jacobians):
+        for column, jump in born.get(node, ()):
+            slopes[node, :, column] += jump
+        slopes[node + 1] = jacobian[:, :nx] @ slopes[node]
+        slopes[node + 1] += jacobian[:, nx, None] * by_pressure[node]
+    return slopes
 
 
 def _jacobians(run: Integrator, course: Course, states: np.ndarray) -> np.ndarray:
@@ -132,18 +155,13 @@ def _course(run: Integrator, start: np.ndarray, plan: ValvePlan, step_s: float) 
     return Course(start, mesh.h_s, timeline.valve.T[mesh.phase], p)
 
 
-def _jump(
-    run: Integrator, state: np.ndarray, p: np.ndarray, segment: int, before: float, after: float
+def jump_of(
+    run: Integrator, state: np.ndarray, p: np.ndarray, before: np.ndarray, after: np.ndarray
 ) -> np.ndarray:
-    """Return the change of the state per time by which a switch comes later.
-
-    Valves enter the actuators' rates only, and each segment's its own, so the others' states do not matter.
-    """
+    """Return the change of the state per time by which valves (N-1,) go later from one state to another."""
     rates = actuator_rates(run.structure)
     act = state[run.layout.actuator]
-    valves = np.zeros((run.structure.segments, 2))
-    valves[segment] = before, after
-    both = np.asarray(rates(np.tile(act[:, None], 2), valves, p))
+    both = np.asarray(rates(np.tile(act[:, None], 2), np.stack([before, after], axis=1), p))
     jump = np.zeros(state.size)
     jump[run.layout.actuator] = both[:, 0] - both[:, 1]
     return jump

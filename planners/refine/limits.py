@@ -1,0 +1,191 @@
+"""What a window has to keep, as numbers that must not be negative, with their derivatives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from planners.maze.places import Goal
+from planners.refine.shots import WindowShot
+from planners.search.problem import Problem
+from srs_opt.manoeuvre.rows import BEND_M2, LEVER_M, body_points
+
+Array = NDArray[np.float64]
+LOOK_S = 0.005  # between instants at which the body is measured; it moves 3 mm meanwhile
+# Body lengths. Walls farther from the body than NEAR beyond the margin do not count: a step moves it by less.
+NEAR = 0.06
+SPARE = 1.2e-3  # beyond margin and goal: for ticks, chords between the body's points, and integration
+PLACE, SPEED = 0.002, 0.1  # tolerances of a window's end: body lengths, body lengths per second
+HEADING_RAD = 0.002
+BEND = 0.15  # and of its bends: a share of the largest one, or the heading would tell little of the course
+_HAIR_M = 1e-6
+
+
+@dataclass(frozen=True)
+class End:
+    """Where a window ends: a state of the plan, or in the goal (`state` is None)."""
+
+    state: Array | None = None
+
+
+class Values(NamedTuple):
+    """Limits in lengths: values (n,), to be at least 0, and slopes (n, unknowns), empty where not asked."""
+
+    values: Array
+    slopes: Array
+
+
+class Limits:
+    """Measures windows of one problem.
+
+    Parameters
+    ----------
+    problem : Problem
+    end : End
+    slack_m : float
+        By which the margin may be missed in the window's first cycle (negative; the start of the way).
+    more_spare : float
+        Factor on SPARE.
+    """
+
+    def __init__(self, problem: Problem, end: End, slack_m: float = 0.0, more_spare: float = 1.0) -> None:
+        self.problem, self.end, self.slack_m = problem, end, slack_m
+        self.spare_m = more_spare * SPARE * problem.robot.length_m
+
+    @property
+    def ends(self) -> int:
+        """Number of limits of the end, which come first."""
+        if self.end.state is not None:
+            return 7 + 2 * self.problem.robot.segments
+        return 1 if self.problem.goal.heading is None else 3
+
+    def __call__(self, shots: list[WindowShot]) -> list[Values]:
+        """Return the limits of several simulated windows."""
+        rooms = self._rooms(shots)
+        found = []
+        for shot, room in zip(shots, rooms):
+            parts = [*self._ends(shot), room]
+            values = np.concatenate([p.values for p in parts])
+            found.append(Values(values, np.concatenate([p.slopes for p in parts])))
+        return found
+
+    def _ends(self, shot: WindowShot) -> list[Values]:
+        state, wanted = shot.states[-1], self.end.state
+        slopes = None if shot.slopes is None else shot.slopes[-1]
+        length = self.problem.robot.length_m
+        if wanted is None:
+            return self._arrived(state, slopes)
+        bands = [(0, PLACE * length, 1.0), (1, PLACE * length, 1.0), (2, HEADING_RAD, LEVER_M)]
+        found = []
+        for index, tolerance, unit in bands:
+            for sign in (1.0, -1.0):
+                value = unit * (tolerance - sign * (state[index] - wanted[index]))
+                found.append(_row(value, None if slopes is None else -sign * unit * slopes[index]))
+        forward = 1.0 if wanted[3] >= 0 else -1.0
+        value = LEVER_M * (forward * (state[3] - wanted[3]) + SPEED * length)
+        found.append(_row(value, None if slopes is None else LEVER_M * forward * slopes[3]))
+        return found + self._bends(shot, slopes)
+
+    def _bends(self, shot: WindowShot, slopes: Array | None) -> list[Values]:
+        where = self.problem.run.layout.kappa
+        assert self.end.state is not None
+        wanted, largest = self.end.state[where], float(np.abs(shot.states[:, where]).max())
+        found = []
+        for k, index in enumerate(range(where.start, where.stop)):
+            off = shot.states[-1, index] - wanted[k]
+            for sign in (1.0, -1.0):
+                value = BEND_M2 * (BEND * largest - sign * off)
+                found.append(_row(value, None if slopes is None else -sign * BEND_M2 * slopes[index]))
+        return found
+
+    def _arrived(self, state: Array, slopes: Array | None) -> list[Values]:
+        goal = self.problem.goal
+        inside, toward = depth(goal, state[:2])
+        found = [_row(inside - self.spare_m / 4, None if slopes is None else toward @ slopes[:2])]
+        if goal.heading is not None:
+            off = (state[2] - goal.heading + np.pi) % (2 * np.pi) - np.pi
+            for sign in (1.0, -1.0):
+                value = LEVER_M * (0.99 * goal.heading_tolerance - sign * off)
+                found.append(_row(value, None if slopes is None else -sign * LEVER_M * slopes[2]))
+        return found
+
+    def _rooms(self, shots: list[WindowShot]) -> list[Values]:
+        """Return the clearance beyond the margin, where it is small: of each body's nearest points."""
+        problem, run = self.problem, self.problem.run
+        looked = [_looks(shot) for shot in shots]
+        bodies = [body_points(run, shot.states[at], None)[0] for shot, at in zip(shots, looked)]
+        wanted = [self._wanted(shot, at) for shot, at in zip(shots, looked)]
+        near_m = NEAR * problem.robot.length_m
+        chosen, points = [], []
+        for body, margin in zip(bodies, wanted):
+            rough = problem.field.clearance(body) - margin[:, None]
+            lowest = np.ones_like(rough, dtype=bool)
+            lowest[:, 1:] &= rough[:, 1:] <= rough[:, :-1]
+            lowest[:, :-1] &= rough[:, :-1] <= rough[:, 1:]
+            which = np.nonzero((rough < near_m + problem.field.error_m) & lowest)
+            chosen.append(which)
+            points.append(body[which])
+        room = np.split(self._clear(np.concatenate(points)), np.cumsum([len(p) for p in points])[:-1])
+        found = []
+        for shot, at, which, where, clear, margin in zip(shots, looked, chosen, points, room, wanted):
+            values = clear - margin[which[0]]
+            slopes = np.zeros((values.size, 0))
+            if shot.slopes is not None:
+                slopes = self._room_slopes(shot, at, which, where, clear)
+            found.append(Values(values, slopes))
+        return found
+
+    def _room_slopes(
+        self, shot: WindowShot, at: NDArray[np.int64], which: tuple[Array, ...], where: Array, clear: Array
+    ) -> Array:
+        assert shot.slopes is not None
+        if not len(where):
+            return np.zeros((0, shot.window.size))
+        aside = [self._clear(where + hair) for hair in _HAIR_M * np.eye(2)]
+        toward = (np.stack(aside, axis=1) - clear[:, None]) / _HAIR_M
+        bodies, index = np.unique(which[0], return_inverse=True)
+        nodes = at[bodies]
+        _, lines = body_points(self.problem.run, shot.states[nodes], shot.slopes[nodes])
+        assert lines is not None
+        return np.asarray(np.einsum("nk,nkm->nm", toward, lines[index, which[1]]))
+
+    def _clear(self, points: Array) -> Array:
+        return self.problem.maze.point_clearances(points)
+
+    def _wanted(self, shot: WindowShot, at: NDArray[np.int64]) -> Array:
+        """Return the distance of the centre line from walls that is asked for at nodes."""
+        wanted = np.full(at.size, self.problem.body.reach_m + self.spare_m)
+        wanted[shot.time_s[at] < shot.window.ends_s[0]] += self.slack_m
+        return wanted
+
+
+def depth(goal: Goal, point: Array) -> tuple[float, Array]:
+    """Return how deep inside the goal (negative: outside) a point lies, m, and the derivative by it."""
+    if not goal.boxes:
+        away = np.array([goal.x, goal.y]) - point
+        distance = float(np.hypot(*away))
+        return goal.radius - distance, away / max(distance, 1e-9)
+    region = shapely.union_all([shapely.box(*box) for box in goal.boxes])
+
+    def inside(at: Array) -> float:
+        where = shapely.Point(at)
+        distance = float(shapely.distance(region.boundary, where))
+        return distance if region.contains(where) else -distance
+
+    value = inside(point)
+    return value, np.array([inside(point + hair) - value for hair in _HAIR_M * np.eye(2)]) / _HAIR_M
+
+
+def _row(value: float, slopes: Array | None) -> Values:
+    return Values(np.array([value]), np.zeros((1, 0)) if slopes is None else slopes[None, :])
+
+
+def _looks(shot: WindowShot) -> NDArray[np.int64]:
+    """Return the nodes at which the body is measured."""
+    wanted = np.arange(0.0, shot.time_s[-1], LOOK_S)
+    nodes = np.searchsorted(shot.time_s, wanted - 1e-9).clip(max=shot.time_s.size - 1)
+    return np.unique(np.append(nodes, shot.time_s.size - 1))

@@ -1,0 +1,208 @@
+"""A plan's cycles optimized window after window, certified afresh; never slower than the plan itself.
+
+A window holds a few cycles, begun from the exact state in which the ones before it leave the robot. It ends,
+in less time, where the plan had its last cycle end, within a tolerance: what comes later stays possible.
+Then its first cycles are put on ticks and kept, and the window moves on. The last window ends in the goal.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planners.motion.valves import Joint, gait_end
+from planners.plan.answer import Plan
+from planners.plan.certify import CERTIFIED_STAIR_S, TOLERANCE, certify
+from planners.refine.limits import End, Limits, Values
+from planners.refine.shots import with_slopes
+from planners.refine.solve import Before, Found, WindowSolver
+from planners.refine.ticks import on_ticks
+from planners.refine.window import Window
+from planners.search.problem import Problem
+from planners.search.tree import at_rest
+from srs_opt.errors import NoAnswerError
+
+Array = NDArray[np.float64]
+Tell = Callable[[str], None]
+CYCLES, KEPT = 6, 3  # of a window, and how many of them are kept when it moves on
+STEPS = 16  # of a window; twice as many gain a third more in twice the time
+SPARES = (1.0, 2.5)  # tried one after the other where the certificate refuses
+LEAST_GAIN_S = 0.01
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """What became of a plan.
+
+    Attributes
+    ----------
+    problem : Problem
+        That knows the cycles made for the plan, if there are any.
+    plan : Plan
+        The faster one, or the plan itself.
+    reason : str
+        Why the plan was kept; empty when it is faster.
+    before_s, seconds : float
+        Duration of the plan before; processor time spent.
+    """
+
+    problem: Problem
+    plan: Plan
+    reason: str
+    before_s: float
+    seconds: float
+
+    def to_record(self) -> dict[str, object]:
+        """Return the `refined` entry of the command's JSON."""
+        return {
+            "from_s": round(self.before_s, 5),
+            "to_s": round(self.plan.duration_s, 5),
+            "seconds": round(self.seconds, 3),
+            "kept": self.reason or None,
+        }
+
+    def in_words(self) -> str:
+        """Return a line for people."""
+        if self.reason:
+            return f"not refined: {self.reason}; the plan is kept as found"
+        less = 100 * (1 - self.plan.duration_s / self.before_s)
+        return (
+            f"refined from {self.before_s:.2f} to {self.plan.duration_s:.2f} s ({less:.1f} % less) in "
+            f"{self.seconds:.1f} s"
+        )
+
+
+def refine(problem: Problem, plan: Plan, tell: Tell = lambda message: None) -> Refinement:
+    """Return the plan with all its switches, cycle ends and pressures optimized for time."""
+    began = time.process_time()
+    reason = "nothing faster was found"
+    for spare in SPARES:
+        try:
+            own = _Refiner(problem, plan, spare, tell).cycles()
+        except NoAnswerError as error:
+            reason = str(error)
+            continue
+        origin = problem.motion.rows(plan.gaits[: len(own)])
+        known = replace(problem, motion=problem.motion.with_own(own, origin))
+        numbers = tuple(problem.motion.rest + 1 + k for k in range(len(own)))
+        certificate = certify(known, numbers)
+        if not certificate.passed:
+            reason = f"certificate refused: {certificate.reason}"
+            tell(f"refined plan: {reason}")
+            continue
+        better = Plan(plan.planner, numbers, certificate)
+        if better.duration_s < plan.duration_s - LEAST_GAIN_S:
+            return Refinement(known, better, "", plan.duration_s, time.process_time() - began)
+        reason = "nothing faster was found"
+        break
+    return Refinement(problem, plan, reason, plan.duration_s, time.process_time() - began)
+
+
+class _Refiner:
+    """Moves the window along one plan."""
+
+    def __init__(self, problem: Problem, plan: Plan, spare: float, tell: Tell) -> None:
+        self.problem, self.plan, self.spare, self.tell = problem, plan, spare, tell
+        joints, c = problem.joints, plan.certificate
+        numbers = plan.gaits[: int(c.cycle[-1]) + 1]
+        found = [joints.joint(a, b) for a, b in zip((problem.motion.rest, *numbers), numbers)]
+        self.planned = [joint for joint in found if joint is not None]
+        self.ends = c.states
+        begin_s = sum(joint.gait.period_s for joint in self.planned[:-1])
+        self.arrives_s = float(c.time_s[-1]) - begin_s  # after the last cycle's begin
+        kpa = [entry.gait.pressure_kpa for entry in problem.gaits.gaits]
+        self.pressures = min(kpa), max(kpa)
+
+    def cycles(self) -> list[Joint]:
+        """Return the refined cycles."""
+        problem, count = self.problem, len(self.planned)
+        segments = problem.robot.segments
+        state, slack = at_rest(problem).state, problem.start_slack_m
+        before = Before((0,) * segments, (np.inf,) * segments)
+        kept: list[Joint] = []
+        guess = list(self.planned)  # of what is not kept yet
+        while True:
+            first = len(kept)
+            size = min(CYCLES, count - first)
+            last = first + size == count
+            window = Window.of_cycles(guess[:size], problem.joints.limits)
+            if not kept:
+                window = replace(window, ramp_s=(0.0, *window.ramp_s[1:]))
+            full = window
+            if last:
+                window = _until(window, self.arrives_s)
+            end = End() if last else End(self.ends[first + size - 1])
+            limits = Limits(problem, end, slack if not kept else 0.0, self.spare)
+            solver = WindowSolver(problem.run, state, limits, before, problem.joints.limits, self.pressures)
+            solver.tail_s = (0.0,) * segments if last else self._tail_s(guess[size])
+            found = solver.solve(window, STEPS)
+            now = size if last else KEPT
+            window = self._rounded(solver, found, now)
+            if last:
+                window = _with_rest(window, full, self.arrives_s, problem.joints.limits.dwell_s, problem.joints.limits.tick_s)
+            done = [window.cycle(k) for k in range(now)]
+            kept += done
+            if last:
+                return kept
+            for joint in done:
+                state = self._played(joint, state)
+            before = Before(*map(tuple, gait_end(done[-1].gait)))
+            guess = [*(window.cycle(k) for k in range(now, size)), *guess[size:]]
+            guess[size - now] = replace(guess[size - now], from_kpa=window.pressure_kpa[-1])
+            self.tell(f"refining: {len(kept)} of {count} cycles")
+
+    def _rounded(self, solver: WindowSolver, found: Found, cycles: int) -> Window:
+        shot = with_slopes(solver.run, solver.start, found.shot)
+        (rows,) = solver.limits([shot])
+        room = Values(rows.values[solver.limits.ends :], rows.slopes[solver.limits.ends :])
+        window = on_ticks(shot.window, room, cycles, self.problem.joints.limits.tick_s)
+        _, spare = solver.order_rows(window, 0)
+        if spare.min() < -1e-9:
+            raise NoAnswerError("valves could not play the refined cycles on their ticks")
+        return window
+
+    def _played(self, joint: Joint, state: Array) -> Array:
+        tolerance = TOLERANCE * self.problem.robot.length_m / 16
+        return self.problem.run.run(joint.timeline(CERTIFIED_STAIR_S), state, tolerance).final
+
+    def _tail_s(self, following: Joint) -> tuple[float, ...]:
+        """Return how long each segment's last state must have stood where the window ends."""
+        least, tails = self.problem.joints.limits.dwell_s, []
+        for pairs in following.gait.intervals:
+            first = min(t for pair in pairs for t in pair)
+            tails.append(max(least - first, 0.0))
+        return tuple(tails)
+
+
+def _until(window: Window, arrives_s: float) -> Window:
+    """Return the window up to so long after its last cycle's begin."""
+    begin = window.ends_s[-2] if window.cycles > 1 else 0.0
+    end = begin + arrives_s
+    rows, owners = [], []
+    for row, mine in zip(window.rows, window.cycle_of):
+        count = sum(t < end - 1e-6 for t in row.times_s)
+        rows.append(replace(row, states=row.states[: count + 1], times_s=row.times_s[:count]))
+        owners.append(mine[:count])
+    return replace(window, rows=tuple(rows), cycle_of=tuple(owners), ends_s=(*window.ends_s[:-1], end))
+
+
+def _with_rest(window: Window, full: Window, arrives_s: float, dwell_s: float, tick_s: float) -> Window:
+    """Return the last window with what its last cycle plays after the arrival, as late as planned."""
+    later = window.ends_s[-1] - (full.ends_s[-2] if full.cycles > 1 else 0.0) - arrives_s
+    rows, owners = [], []
+    end = full.ends_s[-1] + later
+    for row, mine, whole in zip(window.rows, window.cycle_of, full.rows):
+        times = list(row.times_s)
+        for t in whole.times_s[len(times) :]:
+            least = times[-1] + dwell_s if times else 0.0
+            times.append(np.ceil(max(t + later, least) / tick_s - 1e-6) * tick_s)
+        rows.append(replace(row, states=whole.states, times_s=tuple(times)))
+        owners.append((*mine, *[window.cycles - 1] * (len(times) - len(mine))))
+        end = max(end, times[-1] + 2 * tick_s)
+    end = float(np.ceil(end / tick_s - 1e-6) * tick_s)
+    return replace(window, rows=tuple(rows), cycle_of=tuple(owners), ends_s=(*window.ends_s[:-1], end))
+

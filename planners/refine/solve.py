@@ -1,0 +1,198 @@
+"""One window's local optimum: sequential linear programming with exact slopes in a trust region."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.optimize import linprog
+
+from planners.motion.valves import ValveLimits
+from planners.refine.limits import Limits, Values
+from planners.refine.shots import WindowShot, shoot_windows, with_slopes
+from planners.refine.window import Window
+from srs_opt.simulate.integrate import Integrator
+
+Array = NDArray[np.float64]
+PENALTY_PER_M = 20.0  # seconds per metre of violation: half a metre per second costs 2
+FRACTIONS = (1.0, 0.5, 0.2, 0.05)  # of a step, simulated side by side
+REACH_S, LEAST_REACH_S, MOST_REACH_S = 0.01, 5e-4, 0.04
+PRESSURE_PER_S = 100.0  # kPa that a step may change per second of reach
+STRETCH = 4.0  # times the reach, that a cycle may be stretched by
+GAIN_S = 5e-4  # a step that gains less is idle
+MOST_IDLE = 2
+
+
+@dataclass(frozen=True)
+class Before:
+    """What the valves did before a window: states and ages (infinite at rest, states 0)."""
+
+    states: tuple[int, ...]
+    ages_s: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Found:
+    """A window, simulated, and what it costs; `worst_m` is the largest violation."""
+
+    shot: WindowShot
+    values: Values
+    merit: float
+    worst_m: float
+
+
+class WindowSolver:
+    """Optimizes the windows of one start and end.
+
+    Parameters
+    ----------
+    run : Integrator
+    start : array (nx,)
+    limits : Limits
+    before : Before
+    valves : ValveLimits
+    pressure_kpa : (low, high)
+    """
+
+    def __init__(
+        self,
+        run: Integrator,
+        start: Array,
+        limits: Limits,
+        before: Before,
+        valves: ValveLimits,
+        pressure_kpa: tuple[float, float],
+    ) -> None:
+        self.run, self.start, self.limits = run, start, limits
+        self.before, self.valves, self.pressure_kpa = before, valves, pressure_kpa
+        self.tail_s = (0.0,) * len(before.states)
+
+    def judge(self, windows: list[Window]) -> list[Found | None]:
+        """Simulate and judge windows; None where the model cannot go on."""
+        shots = shoot_windows(self.run, self.start, windows)
+        values = iter(self.limits([shot for shot in shots if shot is not None]))
+        return [None if shot is None else self._judged(shot, next(values)) for shot in shots]
+
+    @staticmethod
+    def _judged(shot: WindowShot, values: Values) -> Found:
+        missed = np.minimum(values.values, 0.0)
+        # many rows tell of one overlap: the worst counts, and a little of the others
+        penalty = PENALTY_PER_M * (3 * missed.min(initial=0.0) + missed.sum() / 30)
+        return Found(shot, values, shot.window.ends_s[-1] - float(penalty), float(-missed.min(initial=0.0)))
+
+    def solve(self, window: Window, most: int) -> Found:
+        """Return the local optimum near a window."""
+        (best,) = self.judge([window])
+        reach, idle = REACH_S, 0
+        for _ in range(most):
+            if reach < LEAST_REACH_S or idle > MOST_IDLE:
+                break
+            found = self._around(best, reach)
+            if found is None:
+                break
+            f, trial = found
+            gain = best.merit - trial.merit
+            if gain <= 0:
+                reach *= 0.25
+                continue
+            best = trial
+            idle = idle + 1 if gain < GAIN_S else 0
+            reach = min(2 * reach, MOST_REACH_S) if f == 1.0 else max(1.5 * f * reach, LEAST_REACH_S)
+        return best
+
+    def _around(self, best: Found, reach: float) -> tuple[float, Found] | None:
+        """Return the best window that the linear model leads to and for which part of the reach; or None.
+
+        The end is missed by the square of a step, so each part is corrected once by what it misses.
+        """
+        shot = with_slopes(self.run, self.start, best.shot)
+        (rows,) = self.limits([shot])
+        step = self._step(shot.window, rows, reach, np.zeros(0))
+        if step is None:
+            return None
+        x = shot.window.unknowns()
+        tried: list[tuple[float, Window]] = [(f, shot.window.moved(x + f * step)) for f in FRACTIONS]
+        found = list(zip(FRACTIONS, self.judge([window for _, window in tried])))
+        again = []
+        for f, trial in found[:-1]:
+            if trial is not None:
+                ends = self.limits.ends
+                missed = trial.values.values[:ends] - rows.values[:ends] - f * rows.slopes[:ends] @ step
+                better = self._step(shot.window, rows, f * reach, missed)
+                if better is not None:
+                    again.append((f, shot.window.moved(x + better)))
+        found += zip([f for f, _ in again], self.judge([window for _, window in again]))
+        judged = [(f, trial) for f, trial in found if trial is not None]
+        return min(judged, key=lambda pair: pair[1].merit, default=None)
+
+    def _step(self, window: Window, rows: Values, reach: float, missed: Array) -> Array | None:
+        """Return the linear model's best change of the unknowns; None if there is none.
+
+        `missed` is what the model errs by in the first rows.
+        """
+        values = rows.values.copy()
+        values[: missed.size] += missed
+        keep = values < 1.5 * reach + 0.005
+        values, slopes = values[keep], rows.slopes[keep]
+        n, m, ends = window.size, values.size, window.switches + window.cycles
+        by_cycles = window.by_cycles()
+        cost = np.concatenate([by_cycles[ends - 1], np.full(m, PENALTY_PER_M)])
+        near = sparse.hstack([sparse.csr_matrix(-slopes @ by_cycles), -sparse.identity(m)])
+        order, room = self.order_rows(window)
+        order = sparse.hstack([order @ by_cycles, sparse.csr_matrix((room.size, m))])
+        low, high = np.full(n + m, -reach), np.full(n + m, reach)
+        low[window.switches : ends] *= STRETCH
+        high[window.switches : ends] *= STRETCH
+        kpa = window.unknowns()[ends:]
+        span = PRESSURE_PER_S * reach * (self.valves.pressure_rate_kpa_s is None)
+        low[ends:n] = np.clip(self.pressure_kpa[0] - kpa, -span, 0.0)
+        high[ends:n] = np.clip(self.pressure_kpa[1] - kpa, 0.0, span)
+        low[n:], high[n:] = 0.0, np.inf
+        found = linprog(
+            cost,
+            A_ub=sparse.vstack([near, order]).tocsr(),
+            b_ub=np.concatenate([values, np.maximum(room, -reach / 2)]),
+            bounds=np.column_stack([low, high]),
+            method="highs",
+        )
+        return None if found.x is None else by_cycles @ found.x[:n]
+
+    def order_rows(self, window: Window, ticks: int = 1) -> tuple[sparse.csr_matrix, Array]:
+        """Return ``A x <= b`` for changes x: dwell, and every switch in its own cycle.
+
+        Every segment switches inside every cycle; `ticks` are kept for rounding.
+        """
+        tick = self.valves.tick_s
+        least = self.valves.dwell_s + ticks * tick
+        entries: list[tuple[int, int, float]] = []
+        room: list[float] = []
+
+        def row(later: int | None, earlier: int | None, gap: float) -> None:
+            if later is not None:
+                entries.append((len(room), later, -1.0))
+            if earlier is not None:
+                entries.append((len(room), earlier, 1.0))
+            room.append(gap)
+
+        ends, first = window.switches, 0
+        for k, end in enumerate(window.ends_s):
+            begin = window.ends_s[k - 1] if k else 0.0
+            shortest = max(window.ramp_s[k], 2 * least)
+            row(ends + k, ends + k - 1 if k else None, end - begin - shortest)
+        before = zip(self.before.states, self.before.ages_s, self.tail_s)
+        for valves, owners, (state, age, tail) in zip(window.rows, window.cycle_of, before):
+            times = valves.times_s
+            since = -age if valves.states[0] == state else 0.0
+            for j, (time, k) in enumerate(zip(times, owners)):
+                row(first + j, first + j - 1 if j else None, time - (times[j - 1] if j else since) - least)
+                begin, end = window.ends_s[k - 1] if k else 0.0, window.ends_s[k]
+                last = j + 1 == len(times) or owners[j + 1] != k
+                row(first + j, ends + k - 1 if k else None, time - begin - ((1 + ticks) * tick if last else 0.0))
+                row(ends + k, first + j, end - time - (1 + ticks) * tick)
+            if times and tail:
+                row(ends + window.cycles - 1, first + len(times) - 1, window.ends_s[-1] - times[-1] - tail - 2 * ticks * tick)
+            first += len(times)
+        at_row, at_column, value = zip(*entries)
+        return sparse.csr_matrix((value, (at_row, at_column)), shape=(len(room), window.size)), np.array(room)
