@@ -1,1 +1,1 @@
-"""Certified plans made faster: all valve switches, cycle ends and pressures optimized on the dynamic model."""
+"""Certified plans made faster: valve switches, cycle ends and pressures optimized on the dynamic model."""

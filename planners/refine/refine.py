@@ -24,7 +24,9 @@ from planners.refine.ticks import on_ticks
 from planners.refine.window import Window
 from planners.search.problem import Problem
 from planners.search.tree import at_rest
-from srs_opt.errors import NoAnswerError
+from srs_opt.errors import InputError, NoAnswerError
+from srs_opt.orbit.sensitivity import actuator_rates
+from srs_opt.simulate.integrate import Integrator
 
 Array = NDArray[np.float64]
 Tell = Callable[[str], None]
@@ -76,6 +78,27 @@ class Refinement:
         )
 
 
+def check_refinable(problem: Problem) -> None:
+    """Refuse what the optimization knows nothing of.
+
+    Raises
+    ------
+    InputError
+        If cycles are bent by measured factors, something else than time shall be small, or the actuators are
+        not linear in pressure.
+    """
+    if not problem.bending.none:
+        raise InputError("--refine optimizes the model's own motion: expected no --drive beside it")
+    if problem.price != "time":
+        raise InputError(f"--refine shortens the time: expected --cost time beside it, found {problem.price}")
+    run = problem.run
+    if not run.actuator.linear or _knows_frequency(run):
+        raise InputError(
+            f"--refine: the actuators of robot '{problem.robot.name}' have an effect that is not linear or "
+            "depends on the frequency; expected a robot without it"
+        )
+
+
 def refine(problem: Problem, plan: Plan, tell: Tell = lambda message: None) -> Refinement:
     """Return the plan with all its switches, cycle ends and pressures optimized for time."""
     began = time.process_time()
@@ -100,6 +123,14 @@ def refine(problem: Problem, plan: Plan, tell: Tell = lambda message: None) -> R
         reason = "nothing faster was found"
         break
     return Refinement(problem, plan, reason, plan.duration_s, time.process_time() - began)
+
+
+def _knows_frequency(run: Integrator) -> bool:
+    """Return whether the actuators depend on how often a gait repeats itself."""
+    rates, rest = actuator_rates(run.structure), run.rest()[run.layout.actuator]
+    valves = np.ones(run.structure.segments)
+    one, other = (np.asarray(rates(rest, valves, run.pack(40.0, frequency))) for frequency in (1.0, 2.0))
+    return not np.allclose(one, other)
 
 
 class _Refiner:
@@ -143,14 +174,17 @@ class _Refiner:
             now = size if last else KEPT
             window = self._rounded(solver, found, now)
             if last:
-                window = _with_rest(window, full, self.arrives_s, problem.joints.limits.dwell_s, problem.joints.limits.tick_s)
+                window = _with_rest(
+                    window, full, self.arrives_s, problem.joints.limits.dwell_s, problem.joints.limits.tick_s
+                )
             done = [window.cycle(k) for k in range(now)]
             kept += done
             if last:
                 return kept
             for joint in done:
                 state = self._played(joint, state)
-            before = Before(*map(tuple, gait_end(done[-1].gait)))
+            states, ages_s = gait_end(done[-1].gait)
+            before = Before(tuple(states), tuple(ages_s))
             guess = [*(window.cycle(k) for k in range(now, size)), *guess[size:]]
             guess[size - now] = replace(guess[size - now], from_kpa=window.pressure_kpa[-1])
             self.tell(f"refining: {len(kept)} of {count} cycles")
@@ -205,4 +239,3 @@ def _with_rest(window: Window, full: Window, arrives_s: float, dwell_s: float, t
         end = max(end, times[-1] + 2 * tick_s)
     end = float(np.ceil(end / tick_s - 1e-6) * tick_s)
     return replace(window, rows=tuple(rows), cycle_of=tuple(owners), ends_s=(*window.ends_s[:-1], end))
-

@@ -13,6 +13,7 @@ from planners.motion.valves import ValveLimits
 from planners.refine.limits import Limits, Values
 from planners.refine.shots import WindowShot, shoot_windows, with_slopes
 from planners.refine.window import Window
+from srs_opt.errors import NoAnswerError
 from srs_opt.simulate.integrate import Integrator
 
 Array = NDArray[np.float64]
@@ -83,8 +84,16 @@ class WindowSolver:
         return Found(shot, values, shot.window.ends_s[-1] - float(penalty), float(-missed.min(initial=0.0)))
 
     def solve(self, window: Window, most: int) -> Found:
-        """Return the local optimum near a window."""
+        """Return the local optimum near a window.
+
+        Raises
+        ------
+        NoAnswerError
+            If the model cannot go through the window.
+        """
         (best,) = self.judge([window])
+        if best is None:
+            raise NoAnswerError("the model cannot go through the plan")
         reach, idle = REACH_S, 0
         for _ in range(most):
             if reach < LEAST_REACH_S or idle > MOST_IDLE:
@@ -189,10 +198,18 @@ class WindowSolver:
                 row(first + j, first + j - 1 if j else None, time - (times[j - 1] if j else since) - least)
                 begin, end = window.ends_s[k - 1] if k else 0.0, window.ends_s[k]
                 last = j + 1 == len(times) or owners[j + 1] != k
-                row(first + j, ends + k - 1 if k else None, time - begin - ((1 + ticks) * tick if last else 0.0))
+                row(
+                    first + j,
+                    ends + k - 1 if k else None,
+                    time - begin - ((1 + ticks) * tick if last else 0.0),
+                )
                 row(ends + k, first + j, end - time - (1 + ticks) * tick)
             if times and tail:
-                row(ends + window.cycles - 1, first + len(times) - 1, window.ends_s[-1] - times[-1] - tail - 2 * ticks * tick)
+                row(
+                    ends + window.cycles - 1,
+                    first + len(times) - 1,
+                    window.ends_s[-1] - times[-1] - tail - 2 * ticks * tick,
+                )
             first += len(times)
         at_row, at_column, value = zip(*entries)
         return sparse.csr_matrix((value, (at_row, at_column)), shape=(len(room), window.size)), np.array(room)

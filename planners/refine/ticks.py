@@ -34,10 +34,13 @@ def on_ticks(window: Window, rows: Values, cycles: int, tick_s: float) -> Window
     for column in order:
         exact = x[column] / tick_s
         sides = {round(exact)} if abs(exact - round(exact)) < 1e-6 else {math.floor(exact), math.ceil(exact)}
-        tried = [(side * tick_s, values + rows.slopes[:, column] * (side * tick_s - x[column])) for side in sides]
+        tried = [
+            (side * tick_s, values + rows.slopes[:, column] * (side * tick_s - x[column])) for side in sides
+        ]
         near = x[column]
         x[column], values = min(
-            tried, key=lambda way: abs(way[0] - near) - TICKS_PER_M * tick_s * float(np.minimum(way[1], 0.0).sum())
+            tried,
+            key=lambda way: abs(way[0] - near) - TICKS_PER_M * tick_s * float(np.minimum(way[1], 0.0).sum()),
         )
     begins = np.array([0.0, *x[n : n + window.cycles]])[owners]
     x[:n] = np.maximum(x[:n], begins)  # a cycle's first switch and its begin may go to different sides

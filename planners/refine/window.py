@@ -118,7 +118,12 @@ class Window:
             first += count
         ends, kpa = x[first : first + self.cycles], x[first + self.cycles :]
         return Window(
-            tuple(rows), self.cycle_of, tuple(map(float, ends)), tuple(map(float, kpa)), self.ramp_s, self.from_kpa
+            tuple(rows),
+            self.cycle_of,
+            tuple(map(float, ends)),
+            tuple(map(float, kpa)),
+            self.ramp_s,
+            self.from_kpa,
         )
 
     def by_cycles(self) -> Array:
@@ -147,12 +152,15 @@ class Window:
         for k, ramp_s in enumerate(self.ramp_s):
             if ramp_s:
                 treads = max(1, round(ramp_s / STAIR_S))
-                found += [Edge(column + k - 1 if k else -1, begin + ramp_s * j / treads, -1) for j in range(treads + 1)]
+                found += [
+                    Edge(column + k - 1 if k else -1, begin + ramp_s * j / treads, -1)
+                    for j in range(treads + 1)
+                ]
             begin = self.ends_s[k]
         return [e for e in found if e.time_s < self.ends_s[-1] - SAME_S]
 
     def pressure_shares(self, time_s: Array) -> Array:
-        """Return how much of each cycle's pressure, and of the one before, holds at instants (n, cycles + 1)."""
+        """Return the parts of the pressures, the one before first, at instants (n, cycles + 1)."""
         begins = np.array([0.0, *self.ends_s[:-1]])
         k = np.clip(np.searchsorted(begins, time_s, side="right") - 1, 0, self.cycles - 1)
         ramp = np.array(self.ramp_s)[k]
@@ -177,7 +185,9 @@ class Window:
         inner = inner[np.append(True, np.diff(inner) > SAME_S)] if inner.size else inner
         edges = np.array([0.0, *inner, end])
         middles = (edges[:-1] + edges[1:]) / 2
-        valve = np.array([np.array(r.states)[np.searchsorted(r.times_s, middles)] for r in self.rows], dtype=float)
+        valve = np.array(
+            [np.array(r.states)[np.searchsorted(r.times_s, middles)] for r in self.rows], dtype=float
+        )
         return Timeline(np.diff(edges), valve, self.pressures(middles), np.ones(middles.size))
 
     def cycle(self, k: int) -> Joint:

@@ -11,8 +11,8 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from srs_opt.gait_opt.goal import air_work_j, chamber_volume_m3
 from srs_opt.gait import Gait
+from srs_opt.gait_opt.goal import air_work_j, chamber_volume_m3
 from srs_opt.gait_opt.table import GaitTable
 from srs_opt.robot import Robot
 

@@ -65,7 +65,11 @@ def motion_record(problem: Problem, plan: Plan, execution: Execution | None = No
     joining = sorted(pair for pair in pairs if not problem.joints.is_plain(*pair))
     for run in runs:
         run["cycles"] = [
-            [used.index(row(gait)), start, joining.index((before, gait)) if (before, gait) in joining else None]
+            [
+                used.index(row(gait)),
+                start,
+                joining.index((before, gait)) if (before, gait) in joining else None,
+            ]
             for before, gait, start in run["cycles"]
         ]
     limits = problem.joints.limits

@@ -33,6 +33,7 @@ LAYERS = (
     # a geometric path is followed as the drive does it, hence so high
     (
         "planners.plan",
+        "planners.refine",
         "planners.drive",
         "planners.view",
         "planners.search.follow",
