@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import shutil
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -54,7 +55,7 @@ def test_slopes_are_those_of_finer_simulations(planned):
     problem, plan = planned
     start = at_rest(problem).state
     numbers = (problem.motion.rest, *plan.gaits)
-    joints = [problem.joints.joint(a, b) for a, b in zip(numbers[:3], numbers[1:4])]
+    joints = [problem.joints.joint(a, b) for a, b in pairwise(numbers[:4])]
     window = Window.of_cycles(joints, problem.joints.limits)
     (shot,) = shoot_windows(problem.run, start, [window])
     slopes = with_slopes(problem.run, start, shot).slopes[-1][:3]
