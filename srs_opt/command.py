@@ -110,6 +110,19 @@ def add_model(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_valve_limits(parser: argparse._ActionsContainer) -> None:
+    """Add what a valve pattern must keep to, and on which tick it stands."""
+    add = parser.add_argument
+    add("--max-curvature", type=positive_float, metavar="1_M", help="largest curvature, 1/m")
+    add(
+        "--min-dwell", type=positive_float, default=0.02, metavar="S",
+        help="least time between switches of a valve, s (default 0.02)",
+    )  # fmt: skip
+    add(
+        "--tick", type=positive_float, default=0.001, metavar="S", help="controller's tick, s (default 0.001)"
+    )
+
+
 def chosen_model(options: argparse.Namespace, robot: Robot) -> str:
     """Return the model that --model names, else the robot's own."""
     return str(options.model or robot.own_model)

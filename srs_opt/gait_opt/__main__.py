@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from srs_opt.command import (
     Answer,
     Parser,
+    add_valve_limits,
     chosen_model,
     finite_float,
     make_parser,
@@ -100,7 +101,8 @@ def build_parser() -> Parser:
 
 
 def _add_limits(parser: Parser) -> None:
-    add = parser.add_argument_group("limits").add_argument
+    group = parser.add_argument_group("limits")
+    add = group.add_argument
     add(
         "--frequency",
         nargs=2,
@@ -116,15 +118,7 @@ def _add_limits(parser: Parser) -> None:
         metavar=("LO", "HI"),
         help="kPa (default 41 55; for --table 20 55)",
     )
-    add("--max-curvature", type=positive_float, metavar="1_M", help="largest curvature, 1/m")
-    add(
-        "--min-dwell",
-        type=positive_float,
-        default=0.02,
-        metavar="S",
-        help="least time on or off (default 0.02)",
-    )
-    add("--tick", type=positive_float, default=0.001, metavar="S", help="controller's tick (default 0.001)")
+    add_valve_limits(group)
     add("--valve-delay", type=finite_float, metavar="S", help="instead of the robot's own, s")
     add(
         "--chamber-volume",
@@ -287,7 +281,7 @@ def _run_table(options: argparse.Namespace) -> Answer:
     from srs_opt.controller.c_source import write_program
     from srs_opt.controller.program import Program
     from srs_opt.gait_opt.catalogue import cached_table_path
-    from srs_opt.gait_opt.entries import reticked_table
+    from srs_opt.gait_opt.entries import certified_table
     from srs_opt.gait_opt.export import write_csv
     from srs_opt.gait_opt.family import TABLE_PRESSURE_KPA, build_table
     from srs_opt.gait_opt.figures import draw_pareto
@@ -308,9 +302,8 @@ def _run_table(options: argparse.Namespace) -> Answer:
     where = {"jobs": options.jobs, "cluster": options.cluster}
     try:
         if options.warm:
-            table = reticked_table(
-                robot, load_table(options.warm, robot), limits, partial(say, options), **where
-            )
+            table = load_table(options.warm, robot)
+            table = certified_table(robot, table, limits, partial(say, options), on_other_ticks=True, **where)
         else:
             table = build_table(robot, model, limits, partial(say, options), resume=unfinished, **where)
     except KeyboardInterrupt:

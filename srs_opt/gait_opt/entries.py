@@ -35,61 +35,27 @@ def certified_table(
     limits: Limits,
     say: Say = lambda text: None,
     *,
+    on_other_ticks: bool = False,
     jobs: int = 1,
     cluster: str | None = None,
 ) -> GaitTable:
     """Return the table with every entry's certificate; entries that fail are left out, and said so.
+
+    Parameters
+    ----------
+    on_other_ticks : bool
+        Put the table on ticks of `limits.tick_s` first: of every entry the gait whose motion is nearest to
+        it. Pressure and frequency keep the entry's own as limits where `limits` are narrower.
 
     Raises
     ------
     NoAnswerError
         If none passes.
     """
-    work = partial(_certified, _Work(robot, table.model, limits))
-    return _kept(table, _each(work, table, jobs, cluster), say)
-
-
-def reticked_table(
-    robot: Robot,
-    table: GaitTable,
-    limits: Limits,
-    say: Say = lambda text: None,
-    *,
-    jobs: int = 1,
-    cluster: str | None = None,
-) -> GaitTable:
-    """Return the table on ticks of `limits.tick_s`: of every entry the gait whose motion is nearest to it.
-
-    Every entry is certified on its new ticks. Pressure and frequency keep the entry's own as limits where
-    `limits` are narrower.
-
-    Raises
-    ------
-    NoAnswerError
-        If no entry passes.
-    """
-    work = partial(_reticked, _Work(robot, table.model, limits))
-    return _kept(table, _each(work, table, jobs, cluster), say)
-
-
-@dataclass(frozen=True)
-class _Work:
-    robot: Robot
-    model: str
-    limits: Limits
-
-
-def _each(
-    work: Callable[[Sequence[TableGait]], list[tuple[TableGait | None, str]]],
-    table: GaitTable,
-    jobs: int,
-    cluster: str | None,
-) -> list[tuple[TableGait | None, str]]:
+    each = _on_ticks if on_other_ticks else _certificate
+    work = partial(_every, each, _Work(robot, table.model, limits))
     with executor(jobs, cluster) as where:
-        return list(sweep(work, list(table.gaits), chunk=8, where=where))
-
-
-def _kept(table: GaitTable, results: list[tuple[TableGait | None, str]], say: Say) -> GaitTable:
+        results = list(sweep(work, list(table.gaits), chunk=8, where=where))
     for entry, (kept, line) in zip(table.gaits, results):
         if kept is None:
             say(f"{entry.name}: left out, {line}")
@@ -99,8 +65,18 @@ def _kept(table: GaitTable, results: list[tuple[TableGait | None, str]], say: Sa
     return replace(table, gaits=gaits)
 
 
-def _certified(work: _Work, entries: Sequence[TableGait]) -> list[tuple[TableGait | None, str]]:
-    return [_certificate(work, entry) for entry in entries]
+@dataclass(frozen=True)
+class _Work:
+    robot: Robot
+    model: str
+    limits: Limits
+
+
+_Each = Callable[[_Work, TableGait], tuple[TableGait | None, str]]
+
+
+def _every(each: _Each, work: _Work, entries: Sequence[TableGait]) -> list[tuple[TableGait | None, str]]:
+    return [each(work, entry) for entry in entries]
 
 
 def _certificate(work: _Work, entry: TableGait) -> tuple[TableGait | None, str]:
@@ -121,10 +97,6 @@ def _certificate(work: _Work, entry: TableGait) -> tuple[TableGait | None, str]:
         clearance if clearance < float("inf") else None,
     )
     return replace(entry, certificate=kept), ""
-
-
-def _reticked(work: _Work, entries: Sequence[TableGait]) -> list[tuple[TableGait | None, str]]:
-    return [_on_ticks(work, entry) for entry in entries]
 
 
 def _on_ticks(work: _Work, entry: TableGait) -> tuple[TableGait | None, str]:

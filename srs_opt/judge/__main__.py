@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from srs_opt.command import (
     Answer,
@@ -18,7 +19,9 @@ from srs_opt.command import (
 )
 
 if TYPE_CHECKING:
+    from srs_opt.judge.manoeuvres import Played
     from srs_opt.judge.opinion import Opinion, Tolerance
+    from srs_opt.judge.replay import Replay
     from srs_opt.robot import Robot
 
 SHOWN = 30  # rows of the printed table
@@ -28,8 +31,8 @@ def build_parser() -> Parser:
     """Return the command's options."""
     parser = make_parser(
         "python -m srs_opt.judge",
-        "Play a gait, all gaits of a table, or a plan in another physics engine (DART: rolling wheels,\n"
-        "exact Coulomb contact) and say whether it agrees with us. Needs the extra 'judge'.\n"
+        "Play a gait, all gaits of a table, a plan or a manoeuvre in another physics engine (DART:\n"
+        "rolling wheels, exact Coulomb contact) and say whether it agrees with us. Needs the extra 'judge'.\n"
         "Lengths in m, times in s, angles in rad. Exit status 1: it does not agree.",
         "python -m srs_opt.judge out/gait_opt/gait.json",
         sweep=True,
@@ -38,7 +41,8 @@ def build_parser() -> Parser:
     add(
         "file",
         metavar="FILE",
-        help="gait.json, gait_table.json (all), gait_table.json:NAME, schedule .csv, plan.json, motion.json",
+        help="gait.json, gait_table.json (all), gait_table.json:NAME, schedule .csv, plan.json, motion.json, "
+        "manoeuvre.json (with valves.csv beside it)",
     )
     add("--pressure", type=positive_float, default=55.0, metavar="KPA", help="for a schedule (default 55)")
     add("--step", type=positive_float, default=1e-3, metavar="S", help="the engine's step (default 0.001)")
@@ -73,29 +77,45 @@ def run(options: argparse.Namespace) -> Answer:
     tolerance = Tolerance(options.tolerance, 1.5 * options.tolerance)
     if Path(options.file).name in ("plan.json", "motion.json"):
         return _motion(options, robot)
+    if Path(options.file).name == "manoeuvre.json":
+        return _manoeuvre(options, robot)
     return _gaits(options, robot, tolerance)
 
 
 def _motion(options: argparse.Namespace, robot: Robot) -> Answer:
-    import time
-
-    from srs_opt.files import write_json
-    from srs_opt.judge.figures import draw_replay
     from srs_opt.judge.gaits import Settings
     from srs_opt.judge.replay import load_motion, replay
     from srs_opt.judge.walls import solid_region
 
     motion = load_motion(options.file)
+    walls = solid_region(motion["maze"])
+    return _beside(options, robot, "drive", lambda: replay(robot, motion, Settings(options.step)), walls)
+
+
+def _manoeuvre(options: argparse.Namespace, robot: Robot) -> Answer:
+    from srs_opt.judge.gaits import Settings
+    from srs_opt.judge.manoeuvres import load_manoeuvre, replay_manoeuvre
+
+    asked = (*load_manoeuvre(options.file, robot), chosen_model(options, robot), Settings(options.step))
+    return _beside(options, robot, "manoeuvre", lambda: replay_manoeuvre(robot, *asked), None)
+
+
+def _beside(
+    options: argparse.Namespace, robot: Robot, key: str, play: Callable[[], Replay | Played], walls: Any
+) -> Answer:
+    """Play a motion, write it beside ours."""
+    import time
+
+    from srs_opt.files import write_json
+    from srs_opt.judge.figures import draw_replay
+
     begun = time.perf_counter()
-    seen = replay(robot, motion, Settings(options.step))
-    answer = {
-        "drive": seen.to_record(),
-        "robot": robot.name,
-        "seconds": round(time.perf_counter() - begun, 3),
-    }
+    seen = play()
+    seconds = round(time.perf_counter() - begun, 3)
+    answer = {key: seen.to_record(), "robot": robot.name, "seconds": seconds}
     files = [
         write_json(options.out / "judge.json", answer),
-        *draw_replay(seen, solid_region(motion["maze"]), robot.body_width_m, options.out / "judge"),
+        *draw_replay(seen, walls, robot.body_width_m, options.out / "judge"),
     ]
     return Answer(answer, seen.in_words(), seen.agrees, tuple(files))
 

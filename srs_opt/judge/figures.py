@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from srs_opt.figures import COLOURS, PAGE_IN, draw_body, fill_region, new_figure, save_figure, styled
+from srs_opt.judge.manoeuvres import Played
 from srs_opt.judge.opinion import Opinion
 from srs_opt.judge.replay import Replay
 
@@ -61,18 +62,23 @@ def _panel(
 
 
 @styled
-def draw_replay(seen: Replay, walls: Any, width_m: float, stem: Path) -> tuple[Path, Path]:
-    """Draw the engine's way and bodies among the walls, and our way; return the files."""
-    xmin, ymin, xmax, ymax = walls.bounds
+def draw_replay(seen: Replay | Played, walls: Any, width_m: float, stem: Path) -> tuple[Path, Path]:
+    """Draw the engine's way and bodies among the walls, if there are any, and our way; return the files."""
+    if walls is None:
+        room = np.concatenate([seen.lines.min((0, 1)) - width_m, seen.lines.max((0, 1)) + width_m])
+    else:
+        room = walls.bounds
+    xmin, ymin, xmax, ymax = room
     height_in = PAGE_IN * min(max((ymax - ymin) / (xmax - xmin), 0.25), 1.0) + 0.6
     figure, axes = new_figure(1, 1, width_in=PAGE_IN, height_in=height_in)
-    fill_region(axes, walls, color=COLOURS[7], alpha=0.8)
+    if walls is not None:
+        fill_region(axes, walls, color=COLOURS[7], alpha=0.8)
     shown = np.linspace(0, len(seen.lines) - 1, BODIES).round().astype(int)
     for k in shown:
         draw_body(axes, seen.lines[k, :, 0], seen.lines[k, :, 1], width_m, color=COLOURS[5], alpha=0.5)
     axes.plot(*seen.ours.T, color=COLOURS[6], linewidth=0.8, linestyle="--", label=f"ours ({seen.name})")
     axes.plot(*seen.centre.T, color=COLOURS[1], linewidth=1.0, label="the engine")
-    if seen.first_contact_s is not None:
+    if isinstance(seen, Replay) and seen.first_contact_s is not None:
         at = seen.centre[int(np.searchsorted(seen.time_s, seen.first_contact_s))]
         axes.plot(*at, "x", color=COLOURS[3], label="first contact")
     axes.set_aspect("equal")

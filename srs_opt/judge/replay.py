@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dart_snake.bending import Lags, respond
-from dart_snake.engine import Snake
+from dart_snake.engine import Motion, Snake
 from srs_opt.document import read_json
 from srs_opt.errors import InputError
 from srs_opt.gait import Gait
@@ -43,19 +43,13 @@ class Phases:
 
 
 @dataclass(frozen=True)
-class Replay:
-    """A run in the engine.
+class Drift:
+    """A motion in the engine beside ours, both played without looking.
 
     Attributes
     ----------
     name : str
-        planned or driven.
-    reached : bool
-        Whether the centre of mass came to the goal.
-    contacts : int
-        How often the body came to touch a wall.
-    first_contact_s : float or None
-    smallest_clearance_m : float
+        planned, driven or manoeuvre.
     drift_m, way_m : float
         How far the centre of mass is from where we have it, in the end or at the first contact; length of our
         way until then.
@@ -66,10 +60,6 @@ class Replay:
     """
 
     name: str
-    reached: bool
-    contacts: int
-    first_contact_s: float | None
-    smallest_clearance_m: float
     drift_m: float
     way_m: float
     time_s: Array
@@ -83,17 +73,43 @@ class Replay:
         return self.drift_m <= max(DRIFT_SHARE * self.way_m, LEAST_DRIFT_M)
 
     def to_record(self) -> dict[str, Any]:
-        """Return the `drive` entry of judge.json."""
+        """Return what judge.json says of every motion that is played."""
         return {
             "run": self.name,
-            "reached": self.reached,
-            "contacts": self.contacts,
-            "first_contact_s": self.first_contact_s,
-            "smallest_clearance_m": round(self.smallest_clearance_m, 6),
             "drift_m": round(self.drift_m, 6),
             "way_m": round(self.way_m, 6),
             "duration_s": round(float(self.time_s[-1]), 4),
             "agrees": self.agrees,
+        }
+
+
+@dataclass(frozen=True)
+class Replay(Drift):
+    """A drive in the engine, among walls.
+
+    Attributes
+    ----------
+    reached : bool
+        Whether the centre of mass came to the goal.
+    contacts : int
+        How often the body came to touch a wall.
+    first_contact_s : float or None
+    smallest_clearance_m : float
+    """
+
+    reached: bool
+    contacts: int
+    first_contact_s: float | None
+    smallest_clearance_m: float
+
+    def to_record(self) -> dict[str, Any]:
+        """Return the `drive` entry of judge.json."""
+        return {
+            **super().to_record(),
+            "reached": self.reached,
+            "contacts": self.contacts,
+            "first_contact_s": self.first_contact_s,
+            "smallest_clearance_m": round(self.smallest_clearance_m, 6),
         }
 
     def in_words(self) -> str:
@@ -156,19 +172,11 @@ def replay(robot: Robot, motion: Mapping[str, Any], settings: Settings = DEFAULT
             f"{robot.segments}; name the robot with --robot"
         )
     duration = float(phases.duration_s.sum())
-    steps = math.ceil(duration / settings.step_s - 1e-9)
-    step_s = duration / steps
     snake = Snake(
-        body_of(robot), (start[0], start[1], start[2]), step_s=step_s, pairs=settings.pairs,
-        walls=boxes_of(maze), slope=slope_of(robot), pull=pull_of(robot, room=True),
+        body_of(robot), (start[0], start[1], start[2]), step_s=whole_step_s(duration, settings),
+        pairs=settings.pairs, walls=boxes_of(maze), slope=slope_of(robot), pull=pull_of(robot, room=True),
     )  # fmt: skip
-    drive = drive_of(robot, phases.valve, phases.pressure_kpa, phases.frequency_hz)
-    times = np.asarray(np.arange(1, steps + 1) * step_s, dtype=np.float64)
-    tau = (robot.tau1_s, robot.tau2_s)
-    curvature, rate, _ = respond(Lags.rest(robot.segments), phases.duration_s, drive, tau, times)
-    seen = snake.play(curvature, rate, ROW_STEPS)
-    masses = np.array([link.mass_kg for link in snake.body.links])
-    centre = np.stack([seen.x_m @ masses, seen.y_m @ masses], axis=1) / masses.sum()
+    seen, centre = play_blind(robot, snake, phases)
     room = clearances(solid_region(maze), seen.line_m, robot.body_width_m)
     at_s = np.linspace(0.0, duration, len(ours))
     began = np.flatnonzero(np.diff(np.concatenate([[0], seen.touched.astype(int)])) > 0)
@@ -177,17 +185,39 @@ def replay(robot: Robot, motion: Mapping[str, Any], settings: Settings = DEFAULT
     until = ours[at_s <= seen.time_s[last] + 1e-9]
     return Replay(
         run["name"],
-        bool(_in_goal(maze["goal"], centre).any()),
-        int(began.size),
-        float(seen.time_s[began[0]]) if began.size else None,
-        float(room.min()),
         float(np.hypot(*(centre[last] - there))),
-        float(np.hypot(*np.diff(until, axis=0).T).sum()),
+        length_m(until),
         seen.time_s,
         centre,
         seen.line_m,
         ours,
+        bool(_in_goal(maze["goal"], centre).any()),
+        int(began.size),
+        float(seen.time_s[began[0]]) if began.size else None,
+        float(room.min()),
     )
+
+
+def whole_step_s(duration_s: float, settings: Settings) -> float:
+    """Return the step nearest below the wanted one that divides the duration."""
+    return duration_s / math.ceil(duration_s / settings.step_s - 1e-9)
+
+
+def play_blind(robot: Robot, snake: Snake, phases: Phases) -> tuple[Motion, Array]:
+    """Play held valves from rest; return the engine's motion and its centre of mass (n, 2)."""
+    drive = drive_of(robot, phases.valve, phases.pressure_kpa, phases.frequency_hz)
+    steps = round(float(phases.duration_s.sum()) / snake.step_s)
+    times = np.asarray(np.arange(1, steps + 1) * snake.step_s, dtype=np.float64)
+    tau = (robot.tau1_s, robot.tau2_s)
+    curvature, rate, _ = respond(Lags.rest(robot.segments), phases.duration_s, drive, tau, times)
+    seen = snake.play(curvature, rate, ROW_STEPS)
+    masses = np.array([link.mass_kg for link in snake.body.links])
+    return seen, np.stack([seen.x_m @ masses, seen.y_m @ masses], axis=1) / masses.sum()
+
+
+def length_m(way: Array) -> float:
+    """Return the length of a way (n, 2)."""
+    return float(np.hypot(*np.diff(way, axis=0).T).sum())
 
 
 def phases_of(motion: Mapping[str, Any], run: Mapping[str, Any]) -> Phases:

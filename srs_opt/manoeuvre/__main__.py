@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from srs_opt.command import (
     Answer,
     Parser,
+    add_valve_limits,
     chosen_model,
     finite_float,
     make_parser,
@@ -71,17 +72,7 @@ def build_parser() -> Parser:
         metavar=("LO", "HI"),
         help="limits of the one pressure, kPa (default 25 55); a gait at start or end sets it",
     )
-    add(
-        "--min-dwell",
-        type=positive_float,
-        default=0.02,
-        metavar="S",
-        help="least time between switches, s (0.02)",
-    )
-    add(
-        "--tick", type=positive_float, default=0.001, metavar="S", help="controller's tick, s (default 0.001)"
-    )
-    add("--max-curvature", type=positive_float, metavar="1_M", help="limit of every bend, 1/m")
+    add_valve_limits(parser)
     add("--starts", type=positive_int, default=8, metavar="N", help="starts that are optimized (default 8)")
     add("--shakes", type=seed_number, default=24, metavar="N", help="perturbed optima tried (default 24)")
     return parser

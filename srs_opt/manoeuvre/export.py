@@ -29,6 +29,7 @@ def record_of(run: Integrator, task: Task, found: Manoeuvre) -> dict[str, Any]:
     u, v, _ = (float(w) for w in path.velocity[-1])
     return {
         "objective": task.objective,
+        "start": {"gait": None if task.start.gait is None else task.start.gait.record()},
         "duration_s": plan.duration_s,
         "pressure_kpa": plan.pressure_kpa,
         "end": {"x_m": x, "y_m": y, "heading_rad": heading, "speed_m_s": float(np.hypot(u, v))},

@@ -7,7 +7,7 @@ import pytest
 
 from srs_opt.gait_opt.aim import within
 from srs_opt.gait_opt.catalogue import shipped_table
-from srs_opt.gait_opt.entries import certified_table, reticked_table
+from srs_opt.gait_opt.entries import certified_table
 from srs_opt.gait_opt.goal import Limits
 from srs_opt.gait_opt.table import GaitTable, TableGait, load_table, save_table
 from srs_opt.gait_opt.ticks import Schedule
@@ -49,7 +49,7 @@ def test_entries_that_overlap_themselves_are_left_out(table):
 def test_a_table_moves_to_a_coarser_tick_and_keeps_its_motions(table):
     names = ("fast", "fast R0.176 back right")
     short = replace(table, gaits=tuple(table[name] for name in names))
-    moved = reticked_table(ROBOT, short, Limits(pressure_kpa=(20.0, 55.0), tick_s=0.01))
+    moved = certified_table(ROBOT, short, Limits(pressure_kpa=(20.0, 55.0), tick_s=0.01), on_other_ticks=True)
     assert tuple(g.name for g in moved.gaits) == names
     for entry in moved.gaits:
         assert Schedule.of_gait(entry.gait, 0.01).period == round(entry.gait.period_s / 0.01)

@@ -15,6 +15,8 @@ from srs_opt.judge.bodies import check_engine
 from srs_opt.judge.gaits import Settings, judge_gait
 from srs_opt.judge.opinion import opinion_on
 from srs_opt.robot import Robot, wpi_srs
+from srs_opt.simulate.timeline import Timeline
+from srs_opt.simulate.valve_file import write_valves
 from virtual_lab.simulate import run
 from virtual_lab.trials import Trial
 from virtual_lab.truth import Parameters, Truth
@@ -37,6 +39,22 @@ def test_a_turning_gait_backwards():
     assert them.agrees
     assert them.judge.speed_m_s < -0.3
     assert them.judge.radius_m * them.judge.turn_rate_rad_s == pytest.approx(them.judge.speed_m_s, rel=1e-6)
+
+
+@pytest.mark.parametrize("begun", [None, "gait"])
+def test_a_manoeuvre_from_rest_and_out_of_a_gait(begun, tmp_path, capsys):
+    gait = published_wave(ROBOT, 2.0, 55.0, 0.3).gait()
+    write_valves(Timeline.of_gait(gait.mirrored(), 1.2), tmp_path / "valves.csv")
+    start = {"gait": None if begun is None else gait.record()}
+    (tmp_path / "manoeuvre.json").write_text(json.dumps({"start": start}))
+    asked = ["--step", "2e-3", "--json", "--quiet", "--out", str(tmp_path / "out")]
+    status = main([str(tmp_path / "manoeuvre.json"), *asked])
+    played = json.loads(capsys.readouterr().out)["manoeuvre"]
+    assert (status, played["agrees"]) == (0, True)
+    assert played["duration_s"] == pytest.approx(1.2, abs=0.021)
+    assert played["way_m"] > (0.1 if begun is None else 0.2)
+    assert played["turn_rad"] == pytest.approx(played["our_turn_rad"], abs=0.05)
+    assert played["our_turn_rad"] < -0.3
 
 
 def test_soft_silicone():

@@ -43,8 +43,8 @@ BODY_NAMES = (
     "place ahead",
     "place aside",
 )
-# GCC spends nine tenths of -O1 on the registers of these long straight lines (19 s for five segments, 2.5 s with
-# -Og) and gains 7 % of their running time; -O0 takes three times as long to run
+# GCC spends nine tenths of -O1 on the registers of these long functions without a branch (19 s for five
+# segments, 2.5 s with -Og) and gains 7 % of their running time; with -O0 they take three times as long to run
 LIGHT = ("-Og", *FLAGS[1:])
 QUADRATURES = 3  # mean ahead, mean aside, friction work
 
