@@ -10,8 +10,8 @@ import os
 import sys
 import time
 from pathlib import Path
-from typing import NoReturn
 
+from virtual_lab.command_line import Parser
 from virtual_lab.errors import LabError
 
 PROG = "python -m virtual_lab"
@@ -30,11 +30,6 @@ MOST = {
 }
 
 
-class _Parser(argparse.ArgumentParser):
-    def error(self, message: str) -> NoReturn:
-        self.exit(2, f"{PROG}: {message} (see {PROG} --help)\n")
-
-
 def _number(text: str) -> float:
     try:
         value = float(text)
@@ -47,7 +42,7 @@ def _number(text: str) -> float:
 
 def build_parser() -> argparse.ArgumentParser:
     """Return the command's parser."""
-    parser = _Parser(
+    parser = Parser(
         prog=PROG,
         description="Write a measured data set from a seed, with effects hidden in it; "
         "what is hidden goes to <DIR>.truth.json beside it.",

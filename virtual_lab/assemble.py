@@ -177,6 +177,8 @@ def link_table(truth: Truth, factors: Factors, hidden: Hidden) -> np.ndarray:
     table[0, kernel.LOAD] += hidden.get("tether_weight", {}).get("load_n", 0.0)
     table[:, kernel.MU_T] = p.friction_tangential * factors.friction_tangential
     table[:, kernel.MU_N] = p.friction_normal * factors.friction_normal
+    if "stiff_wheel" in hidden:
+        table[int(hidden["stiff_wheel"]["link"]) - 1, kernel.MU_T] *= 1.0 + hidden["stiff_wheel"]["excess"]
     if "worn_wheels" in hidden:
         place = np.linspace(-0.5, 0.5, p.links)
         table[:, kernel.MU_N] *= 1.0 + hidden["worn_wheels"]["gradient"] * place
@@ -284,6 +286,8 @@ def push_table(truth: Truth, trial: Trial, sign: np.ndarray, factors: Factors, h
         ratio = hidden["crosstalk"]["ratio"]
         reach[:, 1:] += ratio * sign[:, :-1]
         reach[:, :-1] += ratio * sign[:, 1:]
+    if "leaking_segment" in hidden:
+        reach[:, int(hidden["leaking_segment"]["segment"]) - 1] *= 1.0 - hidden["leaking_segment"]["loss"]
     if "lopsided_chambers" in hidden:
         reach *= 1.0 + hidden["lopsided_chambers"]["ratio"] * sign
     return c0 * reach

@@ -10,6 +10,7 @@ Those in no list:
 - hose_torsion: a constant torque on the body, left when positive;
 - carpet_edge: mu_t times 1 + extra where the place along `direction` exceeds edge_m (blurred over 1 cm);
 - floor_waves: a floor of slope ``slope cos(2 pi s / wavelength)`` along `direction`;
+- stiff_wheel: mu_t of one link times 1 + excess;
 - worn_wheels: mu_n changes evenly along the body, by `gradient` in all, more at the head when positive;
 - sideways_stiction: the term across the wheels times 1 + excess exp(-(v_n/speed)^2);
 - bend_unloads: normal force times 1 - per_curv |mean curvature of the neighbouring segments|, at least 0;
@@ -18,6 +19,7 @@ Those in no list:
 - slow_valve: one segment's left valve opens late by delay_s, its other switches are on time;
 - tank_empties, compressor_ripple: the pressure's share is exp(-per_s t), 1 + ratio sin(2 pi f t);
 - warming_silicone: both time constants times 1 + per_s t;
+- leaking_segment: C0 of one segment times 1 - loss;
 - lopsided_chambers: C0 times 1 + ratio to the left, 1 - ratio to the right (in the sign of the command);
 - long_segment: one chamber longer by the share `extra`; payload: a mass on one link;
 - lens_barrel: image times 1 + per_m2 r^2; rolling_shutter: link i is seen (i - 1) delay_s late;
@@ -116,6 +118,7 @@ _UNLISTED = (
     _unlisted("hose_torsion", "torque_n_m", 1.5e-3, True, "tether"),
     _unlisted("carpet_edge", "extra direction edge_m", 2.0, False, "room", edge_m=0.08),
     _unlisted("floor_waves", "slope wavelength_m direction", 0.02, False, "room", wavelength_m=0.25),
+    _unlisted("stiff_wheel", "excess link", 5.0, False, "wheels"),
     _unlisted("worn_wheels", "gradient", 0.8, True, "wheels"),
     _unlisted("sideways_stiction", "excess speed", 0.6, False, "wheels", speed=0.03),
     _unlisted("bend_unloads", "per_curv", 0.025, False, "wheels"),
@@ -126,6 +129,7 @@ _UNLISTED = (
     _unlisted("tank_empties", "per_s", 0.06, False, "bending"),
     _unlisted("compressor_ripple", "ratio frequency_hz", 0.25, False, "bending", frequency_hz=0.35),
     _unlisted("warming_silicone", "per_s", 0.12, False, "bending"),
+    _unlisted("leaking_segment", "loss segment", 0.15, False, "bending"),
     _unlisted("lopsided_chambers", "ratio", 0.08, True, "bending"),
     _unlisted("long_segment", "extra segment", 0.35, True, "body"),
     _unlisted("payload", "extra_kg link", 0.03, False, "body"),

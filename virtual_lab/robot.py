@@ -17,11 +17,11 @@ import sys
 import time
 import tty
 from pathlib import Path
-from typing import NoReturn
 
 import numpy as np
 
 from virtual_lab.catalogue import find_kind
+from virtual_lab.command_line import Parser
 from virtual_lab.draw import draw_effect
 from virtual_lab.errors import LabError
 from virtual_lab.truth import Truth
@@ -31,14 +31,9 @@ PROG = "python -m virtual_lab.robot"
 STEP_S = 0.002
 
 
-class _Parser(argparse.ArgumentParser):
-    def error(self, message: str) -> NoReturn:
-        self.exit(2, f"{PROG}: {message} (see {PROG} --help)\n")
-
-
 def build_parser() -> argparse.ArgumentParser:
     """Return the command's parser."""
-    parser = _Parser(
+    parser = Parser(
         prog=PROG,
         description="A virtual snake in real time behind a serial line and a pose stream, its valve\n"
         "controller's C firmware in the loop.",

@@ -9,6 +9,20 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
+# effects that the derivations are compared with, by what they act on
+BODY = [{"name": "head_mass", "extra_kg": 0.02}, {"name": "gap_bending", "ratio": 0.6}]
+GROUND = [
+    {"name": "tether_weight", "load_n": 0.2},
+    {"name": "wheel_toe", "angle": 0.03},
+    {"name": "stribeck", "excess": 1.0, "speed": 0.08},
+    {"name": "slip_rate", "per_speed": 8.0},
+    {"name": "gap_length", "extra_m": 0.008},
+]
+ROOM = [
+    {"name": "floor_slope", "angle": 0.01, "direction": 1.0},
+    {"name": "tether_pull", "force_n": 0.03, "ax_m": 4.0, "ay_m": 5.0},
+]
+
 
 def effect(robot, name):
     """Return the robot's (single) effect `name`, or an empty mapping."""

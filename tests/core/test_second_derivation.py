@@ -4,24 +4,13 @@ import casadi as ca
 import numpy as np
 import oracle_snake as oracle
 import pytest
+from oracle_snake import BODY, GROUND, ROOM
 
 from srs_opt.model.inverse import curvature_controller, forward_dynamics, inverse_dynamics
 from srs_opt.model.parameters import Structure
 from srs_opt.model.registry import build
 from srs_opt.robot import wpi_srs
 
-BODY = [{"name": "head_mass", "extra_kg": 0.02}, {"name": "gap_bending", "ratio": 0.6}]
-GROUND = [
-    {"name": "tether_weight", "load_n": 0.2},
-    {"name": "wheel_toe", "angle": 0.03},
-    {"name": "stribeck", "excess": 1.0, "speed": 0.08},
-    {"name": "slip_rate", "per_speed": 8.0},
-    {"name": "gap_length", "extra_m": 0.008},
-]
-ROOM = [
-    {"name": "floor_slope", "angle": 0.01, "direction": 1.0},
-    {"name": "tether_pull", "force_n": 0.03, "ax_m": 4.0, "ay_m": 5.0},
-]
 CASES = [
     (3, []),
     (4, BODY),

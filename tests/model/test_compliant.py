@@ -14,6 +14,7 @@ from scipy.interpolate import CubicSpline
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "core"))
 import oracle_snake as oracle
+from oracle_snake import BODY, GROUND, ROOM
 
 from srs_opt.errors import InputError
 from srs_opt.gait import Wave
@@ -30,18 +31,6 @@ from srs_opt.simulate.mesh import Mesh
 from srs_opt.simulate.run import motion_of_cycle
 from srs_opt.simulate.timeline import Timeline
 
-BODY = [{"name": "head_mass", "extra_kg": 0.02}, {"name": "gap_bending", "ratio": 0.6}]
-GROUND = [
-    {"name": "tether_weight", "load_n": 0.2},
-    {"name": "wheel_toe", "angle": 0.03},
-    {"name": "stribeck", "excess": 1.0, "speed": 0.08},
-    {"name": "slip_rate", "per_speed": 8.0},
-    {"name": "gap_length", "extra_m": 0.008},
-]
-ROOM = [
-    {"name": "floor_slope", "angle": 0.01, "direction": 1.0},
-    {"name": "tether_pull", "force_n": 0.03, "ax_m": 4.0, "ay_m": 5.0},
-]
 CASES = [(3, []), (5, []), (5, BODY + GROUND + ROOM), (8, GROUND), (12, BODY)]
 RELAXATION_S = 0.005
 

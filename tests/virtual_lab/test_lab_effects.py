@@ -198,6 +198,7 @@ def test_geometry_effects():
         ({"name": "head_mass", "extra_kg": 0.02}, 0.02 * G * 0.043),
         ({"name": "single_wheel_toe", "angle": 0.1, "link": 3}, TOED),
         ({"name": "quadratic_drag", "drag": 0.5}, 5 * 0.5 * 0.04),
+        ({"name": "stiff_wheel", "excess": 5.0, "link": 2}, 5.0 * 0.03 * G * 0.043),
         ({"name": "hose_spring", "stiffness": 0.1, "ax_m": -0.2, "ay_m": 0.0, "slack_m": 0.3}, 0.0),
         ({"name": "hose_spring", "stiffness": 0.1, "ax_m": -0.5, "ay_m": 0.0, "slack_m": 0.3}, 0.02),
         ({"name": "reverse_friction", "excess": 1.5}, 0.0),
@@ -250,6 +251,8 @@ def test_pulls_accelerate_all_the_mass():
 def test_segments_leak_and_tank_empties():
     leak = held(lab({"name": "crosstalk", "ratio": 0.2}))[0]
     assert leak == pytest.approx([3.5, 17.5, 3.5, 0], abs=1e-5)
+    weak = held(lab({"name": "leaking_segment", "loss": 0.2, "segment": 2}))[0]
+    assert weak == pytest.approx([0, 0.8 * 17.5, 0, 0], abs=1e-5)
     emptying = assemble(lab({"name": "tank_empties", "per_s": 0.06}), GAIT, 1.0).bend
     assert kernel.supply(2.0, emptying) == pytest.approx(math.exp(-0.12))
 
