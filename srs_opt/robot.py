@@ -289,8 +289,8 @@ def wpi_srs() -> Robot:
     return robot_from_document(parse_yaml(text, "srs_opt/robots/wpi_srs.yaml", "a robot file"))
 
 
-def save_robot(robot: Robot, path: Path | str) -> Path:
-    """Write `robot` as a robot file (atomically); lists and tables in readable YAML."""
+def save_robot(robot: Robot, path: Path | str, header: str = "") -> Path:
+    """Write `robot` as a robot file (atomically); lists and tables in readable YAML, below a comment."""
     import yaml
 
     from srs_opt.files import write_text
@@ -302,7 +302,8 @@ def save_robot(robot: Robot, path: Path | str) -> Path:
     for key in ("plugins", "relative_sd", "sources"):
         if not record[key]:
             del record[key]
-    return write_text(path, yaml.safe_dump(record, sort_keys=False, width=100))
+    text = yaml.safe_dump(record, sort_keys=False, width=100)
+    return write_text(path, f"{header}\n{text}" if header else text)
 
 
 __all__ = [

@@ -97,15 +97,21 @@ def run(options: argparse.Namespace) -> Answer:
 
 def _written(options: argparse.Namespace, found: Discrepancy, maze: Maze | None) -> Answer:
     """Write the corrected robot and the report, whose pictures simulate once more."""
-    from srs_opt.discrepancy.answer import DESCRIBED_FILE, answer, corrected_robot
+    from srs_opt.discrepancy.answer import (
+        DESCRIBED_FILE,
+        answer,
+        answered_robot,
+        robot_header,
+        robot_name,
+    )
     from srs_opt.discrepancy.report import write_report
     from srs_opt.files import write_json
     from srs_opt.robot import save_robot
 
-    robot = corrected_robot(found)
+    robot = answered_robot(found)
     files = []
     if robot is not None:
-        files.append(save_robot(robot, options.out / "corrected_robot.yaml"))
+        files.append(save_robot(robot, options.out / robot_name(found), robot_header(found)))
         if found.verdict.word == "described":
             files.append(save_robot(robot, options.out / DESCRIBED_FILE))
     record = answer(found, files[0] if files else None)
@@ -175,16 +181,9 @@ def _effect_names(path: Path) -> list[str]:
 
 
 def _summary(found: Discrepancy) -> str:
-    lines = [f"{found.verdict.word}: {found.verdict.why}"]
-    gap = found.gap
-    if gap is not None and gap.ratio is not None and found.verdict.word in ("named", "one_of"):
-        lines.append(
-            f"sealed trials: {gap.calibrated * 1e3:.3f} mm calibrated, {gap.with_effect * 1e3:.3f} mm with "
-            f"the effect, noise floor {gap.noise_floor * 1e3:.3f} mm"
-        )
-    if found.next_experiment is not None:
-        lines.append(f"next: {found.next_experiment.what}")
-    return "\n".join(lines)
+    from srs_opt.discrepancy.words import in_words
+
+    return "\n".join([f"{found.verdict.word}: {found.verdict.why}", *in_words(found)])
 
 
 def main(argv: list[str] | None = None) -> int:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from srs_opt.calibrate.experiment import Experiment, Point
-from srs_opt.calibrate.gram import bounded_solve
+from srs_opt.calibrate.gram import TrialGram, bounded_solve
 from srs_opt.calibrate.instruments import check_expectations
 from srs_opt.discrepancy.hypothesis import Hypothesis
 from srs_opt.discrepancy.select import Selection
@@ -18,6 +18,10 @@ from srs_opt.measurement.records import Schedule, Trial
 LEVEL = 10.0  # deviance that tells two hypotheses apart
 SURE = 0.95  # power from which on an effect's own instrument is asked before further trials
 _SECONDS, _RATE_HZ = 4.0, 60.0
+NOTHING = "no effect"
+_CYCLES = 4  # of a slow gait
+_LEAST_HZ = 1e-3
+_LONG_WAVE = 0.6  # of the set's own phase lag
 
 
 @dataclass(frozen=True)
@@ -28,7 +32,7 @@ class NextExperiment:
     ----------
     what : str
     separates : tuple of str
-        The rivals.
+        The stories that it tells apart.
     expected_power : float
         Probability that it decides between them, if one of them is right.
     """
@@ -54,24 +58,26 @@ INSTRUMENTS = {
 }
 
 
-def rivals_of(selection: Selection, fitted: Sequence[Hypothesis]) -> tuple[Hypothesis, ...]:
-    """Return what an experiment should tell apart: the rivals, or, where nothing fits, the two best stories.
+def rivals_of(selection: Selection, fitted: Sequence[Hypothesis], null: Hypothesis) -> tuple[Hypothesis, ...]:
+    """Return what an experiment should tell apart: the rivals, or without any the two best stories.
 
     The stories are the best fits that put the fault into different stages of the model, so that the answer
-    says where to look.
+    says where to look; where there is one only, that nothing is missing is the other.
     """
     from srs_opt.model.effects import known_effects
 
     found = [selection.best, *selection.rivals]
-    if len(found) > 1 or not selection.best.candidates:
+    if len(found) > 1:
         return tuple(found)
 
     def stages(h: Hypothesis) -> set[str]:
         return {known_effects()[c.effect].kind for c in h.candidates}
 
     own = stages(selection.best)
-    others = [h for h in fitted if h.candidates and stages(h) != own]
-    return (selection.best, *sorted(others, key=lambda h: h.deviance)[:1])
+    others = sorted((h for h in fitted if h.candidates and stages(h) != own), key=lambda h: h.deviance)
+    if others:
+        return selection.best, others[0]
+    return (selection.best, null) if selection.best.candidates else (null,)
 
 
 def next_experiment(
@@ -92,8 +98,18 @@ def next_experiment(
     direct = [f"{INSTRUMENTS[q][0]} ({q})" for q in _own_instruments(first, second)]
     sure = {what: options[what] for what in direct if power(options[what]) > SURE}
     what, gain = max((sure or options).items(), key=lambda item: item[1])
-    names = tuple(" + ".join(h.names) for h in rivals)
+    names = tuple(" + ".join(h.names) or NOTHING for h in rivals)
     return NextExperiment(what, names, round(power(gain), 3))
+
+
+def repeat_of(trial: str, grams: Mapping[str, TrialGram], other: str) -> NextExperiment:
+    """Return that a trial be repeated: a wrong entry does not come twice.
+
+    Its power is that of the misfit to come again.
+    """
+    gain = grams[trial].misfit - grams[trial].count if trial in grams else 0.0
+    what = f"repeat trial {trial}, and check its entry in the notebook"
+    return NextExperiment(what, (f"a wrong entry of {trial}", other), round(power(gain), 3))
 
 
 def _own_instruments(a: Hypothesis, b: Hypothesis) -> list[str]:
@@ -132,34 +148,71 @@ def _reading_variance(expected: Callable[[Mapping[str, float]], float], h: Hypot
 
 
 def proposals(experiment: Experiment, trials: Sequence[Trial]) -> Mapping[str, Trial]:
-    """Return trials worth considering, beside repeats of what was done."""
-    model = max(trials, key=lambda t: (t.pressure_kpa, t.frequency_hz))
-    time_s = np.arange(int(_SECONDS * _RATE_HZ)) / _RATE_HZ
-    seen = experiment.model.links if model.spots is None else len(model.spots)
-    blank = np.zeros((time_s.size, seen, 2))
+    """Return trials worth considering, beside repeats of what was done.
+
+    Frequencies and pressures are those of the set's own gaits, so that the robot can do what is proposed.
+    """
+    gaits = [t for t in trials if t.kind == "gait" and t.frequency_hz > 0] or list(trials)
+    model = max(gaits, key=lambda t: (t.pressure_kpa, t.frequency_hz))
+    slow, fast = (
+        end(t.frequency_hz for t in gaits if t.frequency_hz > 0 or t is model) for end in (min, max)
+    )
+    weak, strong = (end(t.pressure_kpa for t in gaits) for end in (min, max))
+    slow, fast = max(slow, _LEAST_HZ), max(fast, _LEAST_HZ)
+    long_lag = _LONG_WAVE * model.phase_lag_rad
+    duration_s = max(_SECONDS, _CYCLES / slow)
     plain = replace(
-        model,
-        time_s=time_s,
-        markers_m=blank,
-        centre_m=None,
-        duration_s=_SECONDS,
+        _blank(experiment, model, duration_s),
+        duration_s=duration_s,
         schedule=None,
+        applied=None,
         moving=False,
     )
-    segments = experiment.model.segments
-    steps = Schedule("step", 2.0, ((1, 0.0, 1.0),))
+    period_s = 2 / slow
     found = {
-        "a trial with the tether taken off": replace(plain, tether=False),
-        "a slow, strong gait (0.5 Hz, 55 kPa)": replace(plain, frequency_hz=0.5, pressure_kpa=55.0),
-        "a fast, weak gait (2.5 Hz, 35 kPa)": replace(plain, frequency_hz=2.5, pressure_kpa=35.0),
-        "a fast, long wave (2 Hz, lag 0.9 rad)": replace(plain, frequency_hz=2.0, phase_lag_rad=0.9),
-        "the same gait in the opposite heading": replace(plain, heading_rad=plain.heading_rad + np.pi),
+        _gait("a slow, strong gait", slow, strong): replace(plain, frequency_hz=slow, pressure_kpa=strong),
+        _gait("a fast, weak gait", fast, weak): replace(plain, frequency_hz=fast, pressure_kpa=weak),
+        f"{_gait('a fast, long wave', fast, strong)[:-1]}, lag {long_lag:.2g} rad)": replace(
+            plain, frequency_hz=fast, pressure_kpa=strong, phase_lag_rad=long_lag
+        ),
+        f"{_gait('the same gait', plain.frequency_hz, plain.pressure_kpa)} in the opposite heading": replace(
+            plain, heading_rad=plain.heading_rad + np.pi
+        ),
     }
-    for segment in range(1, segments + 1):
-        one = replace(steps, intervals=((segment, 0.0, 1.0),))
-        step = replace(plain, schedule=one, frequency_hz=0.5, kind="step")
-        found[f"a step of segment {segment} alone"] = step
+    if any(t.tether for t in trials):
+        found["a trial with the tether taken off"] = replace(plain, tether=False)
+    for segment in range(1, experiment.model.segments + 1):
+        one = Schedule("step", period_s, ((segment, 0.0, period_s / 2),))
+        step = replace(plain, schedule=one, frequency_hz=1 / period_s, pressure_kpa=strong, kind="step")
+        found[f"a step of segment {segment} alone ({strong:.3g} kPa, {period_s / 2:.2g} s each way)"] = step
+    if plain.markers_m is None:
+        tracked = replace(
+            plain, markers_m=np.zeros((plain.time_s.size, experiment.model.links, 2)), centre_m=None
+        )
+        found[f"{_gait('the same gait', plain.frequency_hz, plain.pressure_kpa)}, every link tracked"] = (
+            tracked
+        )
     return {what: replace(trial, name=what) for what, trial in found.items()}
+
+
+def _gait(what: str, frequency_hz: float, pressure_kpa: float) -> str:
+    return f"{what} ({frequency_hz:.3g} Hz, {pressure_kpa:.3g} kPa)"
+
+
+def _blank(experiment: Experiment, like: Trial, duration_s: float) -> Trial:
+    """Return a trial in which everything is seen, at zero, where `like` sees it."""
+    time_s = np.arange(int(duration_s * _RATE_HZ)) / _RATE_HZ
+    if like.markers_m is None:
+        return replace(like, time_s=time_s, centre_m=np.zeros((time_s.size, 2)))
+    seen = experiment.model.links if like.spots is None else len(like.spots)
+    return replace(like, time_s=time_s, markers_m=np.zeros((time_s.size, seen, 2)), centre_m=None)
+
+
+def _seen(trial: Trial, points: np.ndarray) -> Trial:
+    """Return the trial with what was seen (T, 2 M)."""
+    if trial.markers_m is None:
+        return replace(trial, centre_m=points)
+    return replace(trial, markers_m=points.reshape(len(points), -1, 2))
 
 
 def _trial_gains(
@@ -173,7 +226,7 @@ def _trial_gains(
     try:
         blank = Experiment(experiment.model, trials, experiment.noise)  # its markers stand at zero
         against = blank.residuals(trials, Point(truth.fit.point.values))
-        seen = [replace(t, markers_m=-r.reshape(r.shape[0], -1, 2)) for t, r in zip(trials, against)]
+        seen = [_seen(t, -r) for t, r in zip(trials, against)]
         grams = Experiment(experiment.model, seen, experiment.noise).grams(
             Point(other.fit.point.values), other.fit.coordinates
         )

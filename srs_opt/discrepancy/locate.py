@@ -40,14 +40,18 @@ class Place:
 
 def locate(examined: Examined, most: int = 8) -> tuple[Place, ...]:
     """Return where the gap shows most, best first: parts of the motion, then stages by their best effect."""
+    return (*stages(examined), *left_places(examined)[:most])
+
+
+def left_places(examined: Examined) -> list[Place]:
+    """Return the parts of the motion in which a model leaves something significant, the largest first."""
     detection = examined.detection
     places = [
         Place(g.where, g.against, s.improvement / max(s.dof, 1), a)
         for g, s, a in zip(examined.groups, detection.groups, detection.adjusted)
         if a < 0.05
     ]
-    places.sort(key=lambda p: -p.score)
-    return (*stages(examined), *places[:most])
+    return sorted(places, key=lambda p: -p.score)
 
 
 def stages(examined: Examined) -> tuple[Place, ...]:

@@ -15,27 +15,19 @@ from srs_opt.calibrate.model import Model
 from srs_opt.calibrate.noise import noise_of
 from srs_opt.discrepancy.alike import Pair, alike_pairs
 from srs_opt.discrepancy.describe import Description, describe_gap
-from srs_opt.discrepancy.design import NextExperiment, next_experiment, rivals_of
+from srs_opt.discrepancy.design import NextExperiment, next_experiment, repeat_of, rivals_of
 from srs_opt.discrepancy.examined import Examined
+from srs_opt.discrepancy.first import first_experiment
 from srs_opt.discrepancy.hypothesis import Hypothesis
-from srs_opt.discrepancy.locate import Place, locate, odd_trials
+from srs_opt.discrepancy.locate import Place, locate, misfit_by_trial, odd_trials
 from srs_opt.discrepancy.screen import Score
-from srs_opt.discrepancy.seal import Gap, open_seal
+from srs_opt.discrepancy.seal import Gap, odd_sealed, open_seal
 from srs_opt.discrepancy.search import Search
-from srs_opt.discrepancy.select import Selection, select
+from srs_opt.discrepancy.select import Selection, best_rival, select
+from srs_opt.discrepancy.settings import SETTINGS
 from srs_opt.discrepancy.split import LEAST_OPEN, Split, few_and_brief, split_trials
-from srs_opt.discrepancy.verdict import (
-    DESCRIBED,
-    DETECTED,
-    NAMED,
-    NAMED_IN_PART,
-    NO_GAP,
-    NOT_TESTABLE,
-    ONE_OF,
-    UNKNOWN,
-    Verdict,
-    judge,
-)
+from srs_opt.discrepancy.verdict import BELIEVED, DESCRIBED, NO_GAP, NOT_TESTABLE, UNKNOWN, Verdict, judge
+from srs_opt.discrepancy.visible import Visible, visible
 from srs_opt.measurement.records import DataSet
 from srs_opt.model.effects.generic import TERMS
 from srs_opt.parallel import HERE, Executor
@@ -63,6 +55,10 @@ class Discrepancy:
     sd_m : float
         Noise as estimated from the tracks.
     seconds : float
+    odd : tuple of (str, str)
+        Trials set aside because they contradict the others, and what speaks against them.
+    would_have_seen : Visible or None
+        The smallest missing effect that the data would have shown; where they show none.
     """
 
     dataset: DataSet
@@ -82,11 +78,13 @@ class Discrepancy:
     tried: frozenset[str] = frozenset()
     alike: tuple[Pair, ...] = ()
     description: Description | None = None
+    odd: tuple[tuple[str, str], ...] = ()
+    would_have_seen: Visible | None = None
 
     @property
     def believed(self) -> bool:
         """Whether the best set of effects is taken for what is missing, or for a part of it."""
-        return self.verdict.word in (NAMED, NAMED_IN_PART, DESCRIBED, ONE_OF)
+        return self.verdict.word in BELIEVED
 
     @property
     def answer(self) -> Hypothesis | None:
@@ -94,6 +92,11 @@ class Discrepancy:
         if self.verdict.word == DESCRIBED and self.description is not None:
             return self.description.best
         return self.selection.best if self.selection else None
+
+    @property
+    def set_aside(self) -> tuple[tuple[str, str], ...]:
+        """Trials that no figure rests on, and why."""
+        return (*self.split.left_out, *self.odd)
 
 
 def find_discrepancy(
@@ -124,11 +127,13 @@ def find_discrepancy(
     started = time.perf_counter()
     tell = report or (lambda message: None)
     dataset = mended(dataset).dataset
-    split = split_trials(dataset.trials, seed)
+    split = split_trials(dataset.trials)
     noise = noise_of(replace(dataset, trials=split.open))
     if not split.enough:
-        return _not_testable(dataset, split, noise.white_sd_m, started)
-    quick = few_and_brief(split.open, seed)
+        tell("looking for what to record")
+        following = first_experiment(dataset, noise, model)
+        return _not_testable(dataset, split, noise.white_sd_m, started, following=following)
+    quick = few_and_brief(split.open)
     trials = (*split.open, *split.sealed, *quick)
     groups = split.open, quick, split.sealed
     experiment = Experiment(Model(dataset.robot, model), trials, noise, dataset.bench, where, groups)
@@ -155,8 +160,8 @@ def _examine(
     first = search.coloured(first)
     tell(f"screening {len(search.candidates)} candidates")
     null = search.noise_aware(search.examine(first))
-    at_odds = contradicting(search, null) if null.detection.p_value < DETECTED else ()
-    searched = null.detection.p_value < DETECTED and not at_odds
+    at_odds = contradicting(search, null) if null.detection.p_value < SETTINGS.detected else ()
+    searched = null.detection.p_value < SETTINGS.detected and not at_odds
     best, fitted = search.run(null) if searched else (null, [null.hypothesis])
     if search.experiment.noise != experiment.noise:
         null = null if best is null else search.examine(search.again(null.hypothesis))
@@ -164,18 +169,32 @@ def _examine(
     first = null.hypothesis
     selection = select(best.hypothesis, fitted, split)
     tell("opening the sealed trials")
-    gap = open_seal(experiment, first.fit, best.hypothesis.fit, split.sealed, search.seed)
+    rival = best_rival(best.hypothesis, fitted)
+    opened = first.fit, best.hypothesis.fit
+    gap = open_seal(experiment, *opened, split.sealed, search.seed, rival.fit if rival else None)
+    odd = odd_sealed(gap)
+    sealed = [t for t in split.sealed if t.name not in odd]
+    if odd:
+        gap = open_seal(experiment, *opened, sealed, search.seed, rival.fit if rival else None)
     verdict = judge(null, best, selection, gap, at_odds, restricted=restricted)
     description = None
     if verdict.word == UNKNOWN and not at_odds and not restricted:
         tell(f"describing the gap with the {len(TERMS)} terms of the grammar")
-        description = describe_gap(search, first, best.hypothesis, split.sealed)
+        description = describe_gap(search, first, best.hypothesis, sealed)
     if description is not None and not description.why_not:
         verdict = Verdict(DESCRIBED, f"{description.sentence}; no listed effect does that")
         gap = description.gap
-    following = None
-    if verdict.word in (ONE_OF, UNKNOWN) and not at_odds:
-        following = next_experiment(experiment, rivals_of(selection, fitted), split.open)
+    following, seen = None, None
+    if verdict.word == NO_GAP:
+        seen = visible(experiment, null, search.candidates, sealed)
+    else:
+        tell("looking for the next experiment")
+        stories = rivals_of(selection, fitted, null.hypothesis)
+        following = next_experiment(experiment, stories, split.open)
+        if at_odds or following is None:
+            misfit = misfit_by_trial(null)
+            worst = at_odds[0] if at_odds else max((t.name for t in split.open), key=lambda n: misfit[n])
+            following = repeat_of(worst, null.linearisation.grams, "something that the model lacks")
     return Discrepancy(
         dataset,
         verdict,
@@ -194,6 +213,8 @@ def _examine(
         frozenset(search.tried),
         alike_pairs(null.linearisation, search.candidates),
         description,
+        tuple(odd.items()),
+        seen,
     )
 
 
@@ -213,7 +234,7 @@ def _explained_without(search: Search, null: Examined, odd: Sequence[str]) -> bo
     found = without.calibrate(null.hypothesis.fit.point, FAR_OFF)
     if found is None or found.fit.temper > FAR_OFF:
         return False
-    return without.examine(found).detection.p_value >= DETECTED
+    return without.examine(found).detection.p_value >= SETTINGS.detected
 
 
 def _candidates(dataset: DataSet, effects: Sequence[str] | None, model: Model) -> tuple[Candidate, ...]:
@@ -224,7 +245,12 @@ def _candidates(dataset: DataSet, effects: Sequence[str] | None, model: Model) -
 
 
 def _not_testable(
-    dataset: DataSet, split: Split, sd: float, started: float, why: str | None = None
+    dataset: DataSet,
+    split: Split,
+    sd: float,
+    started: float,
+    why: str | None = None,
+    following: NextExperiment | None = None,
 ) -> Discrepancy:
     if why is None and not dataset.trials:
         why = "the set holds no tracks; maps alone do not show where model and robot part"
@@ -236,7 +262,7 @@ def _not_testable(
         )
     seconds = time.perf_counter() - started
     verdict = Verdict(NOT_TESTABLE, why)
-    return Discrepancy(dataset, verdict, split, None, None, None, (), (), None, None, sd, seconds)
+    return Discrepancy(dataset, verdict, split, None, None, None, (), (), None, following, sd, seconds)
 
 
 __all__ = ["NO_GAP", "Discrepancy", "find_discrepancy"]

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from srs_opt.calibrate.fit import Fit
 from srs_opt.calibrate.gram import bounded_solve
 from srs_opt.calibrate.objective import priors
 from srs_opt.discrepancy.hypothesis import Hypothesis
@@ -26,11 +27,14 @@ class Selection:
     predictive : dict
         Label -> mean and standard error, over trials, of the deviance per trial when the trial's fold was
         left out of the fit, less the best hypothesis'.
+    change : float
+        The largest change of an effect's size, over itself, when a fold of trials is left out.
     """
 
     best: Hypothesis
     rivals: tuple[Hypothesis, ...]
     predictive: dict[str, tuple[float, float]]
+    change: float = 0.0
 
 
 def select(best: Hypothesis, fitted: Sequence[Hypothesis], split: Split) -> Selection:
@@ -38,14 +42,15 @@ def select(best: Hypothesis, fitted: Sequence[Hypothesis], split: Split) -> Sele
 
     A rival explains the data about as well (deviance within RIVAL, counting 2 per parameter), under another
     name, without leaving physics or the bench behind, and holds no effect beyond those of a smaller rival.
+    Where the best leaves a misfit, differences are judged as if that were noise too.
     """
-    own = best.deviance + 2 * best.parameters
+    own, reach = best.deviance + 2 * best.parameters, RIVAL * best.fit.temper
     near = [
         h
         for h in fitted
         if h.names != best.names
         and h.candidates
-        and h.deviance + 2 * h.parameters < own + RIVAL
+        and h.deviance + 2 * h.parameters < own + reach
         and not h.implausible()
     ]
     near.sort(key=lambda h: h.deviance + 2 * h.parameters)
@@ -56,7 +61,15 @@ def select(best: Hypothesis, fitted: Sequence[Hypothesis], split: Split) -> Sele
         if names not in smaller and not any(s < names for s in smaller):
             rivals.append(h)
     predictive = _predictive([best, *rivals], split)
-    return Selection(best, tuple(rivals), predictive)
+    return Selection(best, tuple(rivals), predictive, _change(best, split.folds))
+
+
+def best_rival(best: Hypothesis, fitted: Sequence[Hypothesis]) -> Hypothesis | None:
+    """Return the best plausible set of effects that neither holds all of the best nor is a part of it."""
+    names = set(best.names)
+    others = [h for h in fitted if h.candidates and not (names <= set(h.names) or set(h.names) <= names)]
+    others = [h for h in others if not h.implausible_size()] or others
+    return min(others, key=lambda h: h.deviance + 2 * h.parameters, default=None)
 
 
 def _predictive(hypotheses: Sequence[Hypothesis], split: Split) -> dict[str, tuple[float, float]]:
@@ -74,16 +87,31 @@ def _predictive(hypotheses: Sequence[Hypothesis], split: Split) -> dict[str, tup
 
 def left_out_deviance(hypothesis: Hypothesis, folds: Sequence[Sequence[str]]) -> np.ndarray:
     """Return every trial's deviance under the fit without its fold (one linear step from the full fit)."""
-    fit = hypothesis.fit
+    parts = {name: g.eliminated(hypothesis.fit.temper) for name, g in hypothesis.fit.grams.items()}
+    found = []
+    for fold in folds:
+        step = np.append(_step_without(hypothesis.fit, fold), -1.0)
+        found += [float(step @ parts[name].matrix @ step) + parts[name].log_det for name in fold]
+    return np.array(found)
+
+
+def _step_without(fit: Fit, fold: Sequence[str]) -> np.ndarray:
+    """Return where the fit would go without some trials, one linear step from where it is."""
     precision, offset = priors(fit.coordinates, fit.point)
     now = np.array([fit.point.values[c.name] for c in fit.coordinates])
     lower = np.array([c.lower for c in fit.coordinates]) - now
-    parts = {name: g.eliminated(fit.temper) for name, g in fit.grams.items()}
-    found = []
-    for fold in folds:
-        rest = np.sum([e.matrix for name, e in parts.items() if name not in fold], axis=0)
-        step = np.append(
-            bounded_solve(rest, range(len(fit.coordinates)), precision, offset, lower).step, -1.0
-        )
-        found += [float(step @ parts[name].matrix @ step) + parts[name].log_det for name in fold]
-    return np.array(found)
+    rest = np.sum([g.eliminated(fit.temper).matrix for n, g in fit.grams.items() if n not in fold], axis=0)
+    return bounded_solve(rest, range(len(fit.coordinates)), precision, offset, lower).step
+
+
+def _change(hypothesis: Hypothesis, folds: Sequence[Sequence[str]]) -> float:
+    """Return the largest change of an effect's size over itself when a fold is left out."""
+    names = [c.name for c in hypothesis.fit.coordinates]
+    largest = 0.0
+    for fold in folds if hypothesis.candidates else ():
+        step = _step_without(hypothesis.fit, fold)
+        for candidate in hypothesis.candidates:
+            moved = np.array([step[names.index(c.name)] / c.typical for c in candidate.sizes])
+            size = hypothesis.relative_size(candidate)
+            largest = max(largest, float(np.linalg.norm(moved)) / max(size, 1e-12))
+    return largest

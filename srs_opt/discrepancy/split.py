@@ -1,9 +1,15 @@
-"""Step 1: which trials may be fitted and which stay sealed until the end."""
+"""Step 1: which trials may be fitted and which stay sealed until the end.
+
+The split follows from the data alone. Whole gaits are sealed, all their replicates with them, so that a gap
+that closes is a prediction of gaits that no fit has seen.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import defaultdict
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
+from zlib import crc32
 
 import numpy as np
 
@@ -27,15 +33,18 @@ class Split:
     sealed : tuple of Trial
         Looked at once, at the end.
     folds : tuple of tuple of str
-        Names of the open trials, by fold.
+        Names of the open trials, by fold; trials of one condition are in one fold.
     left_out : tuple of (str, str)
         Trials that cannot be used, and why.
+    new_gaits : bool
+        Whether no sealed trial repeats a gait of an open one.
     """
 
     open: tuple[Trial, ...]
     sealed: tuple[Trial, ...]
     folds: tuple[tuple[str, ...], ...]
     left_out: tuple[tuple[str, str], ...]
+    new_gaits: bool = True
 
     @property
     def enough(self) -> bool:
@@ -43,38 +52,98 @@ class Split:
         return len(self.open) >= LEAST_OPEN and len(self.sealed) >= LEAST_SEALED
 
 
-def split_trials(trials: Sequence[Trial], seed: int = 0) -> Split:
-    """Seal about a quarter of the trials, spread over conditions; deal the others into folds."""
+def split_trials(trials: Sequence[Trial]) -> Split:
+    """Seal about a quarter of the trials, whole conditions at a time, and deal the others into folds."""
     reasons = [(t.name, usable(t)) for t in trials]
     left_out = tuple((name, why) for name, why in reasons if why)
     names = {name for name, _ in left_out}
     good = [t for t in trials if t.name not in names]
-    rng = np.random.default_rng([seed, len(good)])
-    sealed = spread(good, max(round(SEALED_SHARE * len(good)), 1) if len(good) > LEAST_OPEN else 0, rng)
+    groups = _conditions(good)
+    chosen = _chosen(groups, len(good)) if len(good) > LEAST_OPEN else []
+    sealed = [t for t in good if any(t in groups[k] for k in chosen)]
     rest = [t for t in good if t not in sealed]
     folds: list[list[str]] = [[] for _ in range(min(FOLDS, len(rest)))]
-    for k, t in enumerate(sorted(rest, key=lambda t: (t.offset, t.frequency_hz, t.pressure_kpa))):
-        folds[k % len(folds)].append(t.name)
-    return Split(tuple(rest), tuple(sealed), tuple(map(tuple, folds)), left_out)
+    for k, group in enumerate(groups[k] for k in range(len(groups)) if k not in chosen):
+        if folds:
+            folds[k % len(folds)] += [t.name for t in group]
+    gaits = {gait_of(t) for t in rest}
+    new = not any(gait_of(t) in gaits for t in sealed)
+    return Split(tuple(rest), tuple(sealed), tuple(tuple(f) for f in folds if f), left_out, new)
 
 
-def spread(trials: Sequence[Trial], count: int, rng: np.random.Generator) -> list[Trial]:
-    """Choose trials one by one, each from the conditions least chosen so far."""
-    chosen: list[Trial] = []
-    order = [trials[i] for i in rng.permutation(len(trials))]
-    while len(chosen) < count:
-        rest = [t for t in order if t not in chosen]
-        chosen.append(min(rest, key=lambda t: sum(_shared(t, c) for c in chosen)))
+def gait_of(trial: Trial) -> Hashable:
+    """Return what the valves of a trial do: the same for its replicates, in whatever direction they go."""
+    wave = trial.frequency_hz, trial.pressure_kpa, trial.offset, trial.phase_lag_rad
+    schedule = "" if trial.schedule is None else repr((trial.schedule.period_s, trial.schedule.intervals))
+    applied = 0
+    if trial.applied is not None:
+        drive = trial.applied
+        applied = crc32(b"".join(a.tobytes() for a in (drive.time_s, drive.state, drive.pressure_kpa)))
+    return (trial.kind, schedule, applied, *(round(v, 6) for v in wave))
+
+
+_KEYS: tuple[Callable[[Trial], Hashable], ...] = (
+    gait_of,
+    lambda t: (gait_of(t), round(t.heading_rad, 6), t.tether, t.floor or ""),
+    lambda t: (gait_of(t), round(t.heading_rad, 6), t.tether, t.floor or "", t.name),
+)
+
+
+def _conditions(trials: Sequence[Trial]) -> list[list[Trial]]:
+    """Return the trials by gait, in an order of their own; finer where there are too few."""
+    for key in _KEYS:
+        groups: dict[Hashable, list[Trial]] = defaultdict(list)
+        for t in trials:
+            groups[key(t)].append(t)
+        found = [groups[k] for k in sorted(groups, key=repr)]
+        if len(found) > LEAST_OPEN and len(trials) - min(map(len, found)) >= LEAST_OPEN:
+            break
+    return found
+
+
+def _chosen(groups: Sequence[Sequence[Trial]], trials: int) -> list[int]:
+    """Return which groups to seal: the middle one, then such as share least with those chosen."""
+    wanted = max(round(SEALED_SHARE * trials), LEAST_SEALED)
+    order = [k for k in _from_the_middle([g[0] for g in groups]) if groups[k][0].kind != "still"]
+    chosen: list[int] = []
+    count = 0
+    while count < wanted:
+        rest = [k for k in order if k not in chosen]
+        fits = [k for k in rest if count + len(groups[k]) <= max(wanted, trials // 3, 1)]
+        fits = [k for k in fits if trials - count - len(groups[k]) >= LEAST_OPEN]
+        if not fits:
+            break
+        # a gait of many replicates would use up the share and leave fewer gaits to predict
+        best = min(
+            fits,
+            key=lambda k: (len(groups[k]), sum(_shared(groups[k][0], groups[c][0]) for c in chosen)),
+        )
+        chosen.append(best)
+        count += len(groups[best])
     return chosen
 
 
-def few_and_brief(trials: Sequence[Trial], seed: int = 0) -> tuple[Trial, ...]:
+def _from_the_middle(trials: Sequence[Trial]) -> list[int]:
+    """Return the trials' numbers by distance from the middle of the conditions."""
+    table = np.array([(t.frequency_hz, t.pressure_kpa, t.offset, t.phase_lag_rad) for t in trials])
+    spread = table.std(axis=0)
+    scaled = (table - np.median(table, axis=0)) / np.where(spread > 0, spread, np.inf)
+    distance = np.round(np.linalg.norm(scaled, axis=1), 6)
+    return [int(k) for k in np.argsort(distance, kind="stable")]
+
+
+def few_and_brief(trials: Sequence[Trial]) -> tuple[Trial, ...]:
     """Return the first seconds of a few trials, spread over the conditions, under names of their own.
 
     They cost a fraction of the whole, and a motion that has gone on for less long depends on the parameters
     less nonlinearly: a fit that begins with them ends sooner. Nothing where that would save little.
     """
-    chosen = spread(trials, min(FEW, len(trials)), np.random.default_rng([seed, 29]))
+    chosen: list[Trial] = []
+    named = sorted(trials, key=lambda t: (repr(gait_of(t)), t.heading_rad, t.name))
+    order = [named[k] for k in _from_the_middle(named)] if named else []
+    while len(chosen) < min(FEW, len(trials)):
+        rest = [t for t in order if t not in chosen]
+        chosen.append(min(rest, key=lambda t: sum(_shared(t, c) for c in chosen)))
     found = tuple(_first_seconds(t) for t in trials if t in chosen)
     whole, part = (sum(float(t.time_s[-1]) for t in some) for some in (trials, found))
     return found if part < 0.7 * whole else ()

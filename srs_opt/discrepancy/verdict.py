@@ -8,10 +8,11 @@ from dataclasses import dataclass
 from srs_opt.discrepancy.examined import ADEQUATE, Examined, explained
 from srs_opt.discrepancy.seal import Gap
 from srs_opt.discrepancy.select import Selection
+from srs_opt.discrepancy.settings import SETTINGS, Settings
 
-DETECTED = 0.05
 NO_GAP, NAMED, ONE_OF, UNKNOWN, NOT_TESTABLE = "no_gap", "named", "one_of", "unknown", "not_testable"
 NAMED_IN_PART, DESCRIBED = "named_in_part", "described"
+BELIEVED = (NAMED, NAMED_IN_PART, DESCRIBED)
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,7 @@ def judge(
     selection: Selection | None,
     gap: Gap | None,
     at_odds: Sequence[str] = (),
+    settings: Settings = SETTINGS,
     *,
     restricted: bool = False,
 ) -> Verdict:
@@ -42,10 +44,8 @@ def judge(
         against those that close a part of the gap on sealed trials.
     """
     p = null.detection.p_value
-    if p >= DETECTED:
-        return Verdict(
-            NO_GAP, f"calibration alone explains the data (p = {p:.2g}); nothing is missing that they show"
-        )
+    if p >= settings.detected:
+        return _no_gap(gap, p, settings)
     if at_odds:
         who = (
             f"trial {at_odds[0]} contradicts"
@@ -54,39 +54,116 @@ def judge(
         )
         return Verdict(UNKNOWN, f"{who} the others, which calibration alone explains: look there first")
     if selection is None or not selection.best.candidates:
-        return Verdict(UNKNOWN, f"there is a gap (p = {p:.2g}), but no known effect explains it")
+        if gap is not None and negligible(gap, settings):
+            return Verdict(NO_GAP, _small(gap))
+        return Verdict(UNKNOWN, f"there is a gap (p = {p:.2g}), but no known effect explains any of it")
     label = " + ".join(selection.best.names)
-    # what the effects that were not considered do, calibration bends the bench values for
-    in_part = restricted and gap is not None and gap.closed_in_part
-    in_part = in_part and not selection.best.implausible_size()
-    if not explained(null, best):
-        left = best.detection.p_value
-        if in_part:
-            return _in_part(label, f"p of the rest = {left:.2g}")
-        return Verdict(
-            UNKNOWN,
-            f"the best known explanation ({label}) leaves a gap (p = {left:.2g}, limit {ADEQUATE:g}): "
-            "something else is at work",
-        )
-    against = selection.best.implausible()
-    if against:
-        if in_part:
-            return _in_part(label, against)
-        return Verdict(UNKNOWN, f"the best known explanation ({label}) is not plausible: {against}")
-    if gap is not None and gap.ratio is not None and not gap.passed:
-        return Verdict(
-            UNKNOWN,
-            f"{label} fits the open trials but closes only {1 - gap.ratio:.0%} of the gap on the sealed ones",
-        )
-    if selection.rivals:
+    doubt = _doubt(null, best, selection, gap, settings)
+    if not doubt and selection.rivals:
         names = " or ".join(" + ".join(h.names) for h in (selection.best, *selection.rivals))
         return Verdict(ONE_OF, f"the data cannot tell between {names}")
-    return Verdict(NAMED, f"{label} explains the gap, and nothing else known does")
-
-
-def _in_part(label: str, rest: str) -> Verdict:
+    if not doubt:
+        return Verdict(NAMED, f"{label} explains the gap, and nothing else known does{_further(best, gap)}")
+    if gap is not None and negligible(gap, settings):
+        return Verdict(NO_GAP, f"{_small(gap)}; the best known explanation would be {label}, but {doubt}")
+    if gap is not None and _sure_in_part(selection, gap, settings, restricted=restricted):
+        return _in_part(label, doubt, gap, restricted=restricted)
     return Verdict(
-        NAMED_IN_PART,
-        f"{label} explains a part of the gap ({rest}); the rest is none of the effects that were considered: "
-        "go on from the corrected robot with all of them",
+        UNKNOWN, f"the best known explanation is {label}{_closing(gap)}, not believed because {doubt}"
     )
+
+
+def negligible(gap: Gap, settings: Settings = SETTINGS) -> bool:
+    """Whether what calibration alone leaves on the sealed trials is too small to matter."""
+    speed = gap.before.speed_share or 0.0
+    return gap.before.m <= settings.negligible_m and speed <= settings.negligible_speed
+
+
+def _no_gap(gap: Gap | None, p: float, settings: Settings) -> Verdict:
+    """Return the verdict where the open trials show nothing: the sealed ones are asked too."""
+    if gap is not None and not negligible(gap, settings) and gap.before.m > gap.floor_error_m:
+        return Verdict(
+            UNKNOWN,
+            f"calibration alone explains the open trials (p = {p:.2g}), but misses the sealed ones, which no "
+            f"fit saw, by {1e3 * gap.before.m:.2g} mm{_in_speed(gap.before.speed_share)}",
+        )
+    return Verdict(
+        NO_GAP, f"calibration alone explains the data (p = {p:.2g}); nothing is missing that they show"
+    )
+
+
+def _doubt(null: Examined, best: Examined, selection: Selection, gap: Gap | None, settings: Settings) -> str:
+    """Return what counts against the best set of effects; empty when nothing does."""
+    against = selection.best.implausible()
+    if against:
+        return against
+    if explained(null, best):
+        if gap is None or gap.ratio is None or _closed(gap, settings):
+            return ""
+        return f"it closes only {1 - gap.ratio:.0%} of the gap on the sealed trials"
+    left = f"something is left (p = {best.detection.p_value:.2g}, limit {ADEQUATE:g})"
+    if gap is None or gap.share is None:
+        return left
+    if gap.share > settings.left_share and not (
+        gap.after.m <= settings.small_m and gap.share <= settings.small_share
+    ):
+        return f"{left}, {1e3 * gap.after.m:.2g} mm on the sealed trials or {gap.share:.0%} of the gap"
+    if (gap.after.speed_share or 0.0) > settings.speed_share:
+        return f"{left}: the speed is {gap.after.speed_share:.1%} off"
+    return ""
+
+
+def _closed(gap: Gap, settings: Settings) -> bool:
+    """Whether a set of effects that leaves nothing significant closes the gap on the sealed trials."""
+    if gap.ratio is None or gap.interval is None:
+        return False
+    if gap.after.m <= settings.small_m and (gap.share or 0.0) <= settings.small_share:
+        return True
+    near = gap.interval[0] <= settings.closed and gap.ratio <= settings.nearly_closed
+    return gap.ratio <= settings.closed or near
+
+
+def _sure_in_part(selection: Selection, gap: Gap, settings: Settings, *, restricted: bool) -> bool:
+    """Whether every effect of the best set is sure to be a part of what is missing."""
+    best = selection.best
+    if best.implausible_size() or gap.share is None or selection.rivals:
+        return False
+    if restricted:
+        return gap.closed_in_part
+    if best.implausible() or gap.share > settings.part_share:
+        return False
+    firm = selection.change <= settings.part_change and len(best.candidates) <= settings.part_effects
+    return firm and gap.lead is not None and gap.lead >= settings.part_lead
+
+
+def _in_part(label: str, doubt: str, gap: Gap, *, restricted: bool) -> Verdict:
+    rest = (
+        "the rest is none of the effects that were considered: go on from the corrected robot with all"
+        if restricted
+        else "no other set does, in whatever trials; the rest is something else"
+    )
+    return Verdict(NAMED_IN_PART, f"{label} explains a part of the gap{_closing(gap)} ({doubt}); {rest}")
+
+
+def _small(gap: Gap) -> str:
+    return (
+        f"calibration alone predicts the sealed trials within {1e3 * gap.before.m:.2g} mm"
+        f"{_in_speed(gap.before.speed_share)}: what is left is significant, but too small to matter"
+    )
+
+
+def _further(best: Examined, gap: Gap | None) -> str:
+    """Return what is told beside a name: a remainder that is significant."""
+    if gap is None or best.adequate or gap.after.m < 2e-5:
+        return ""
+    return f"; a further {1e3 * gap.after.m:.2g} mm{_in_speed(gap.after.speed_share)} is something else"
+
+
+def _closing(gap: Gap | None) -> str:
+    return (
+        "" if gap is None or gap.share is None else f", which closes {max(1 - gap.share, 0.0):.0%} of the gap"
+    )
+
+
+def _in_speed(share: float | None) -> str:
+    return "" if share is None else f" and {share:.1%} of the speed"

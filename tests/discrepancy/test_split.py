@@ -1,7 +1,12 @@
+from dataclasses import replace
+
 import numpy as np
 
-from srs_opt.discrepancy.split import BRIEF_S, FEW, few_and_brief, split_trials
+from srs_opt.discrepancy.split import BRIEF_S, FEW, few_and_brief, gait_of, split_trials
 from srs_opt.measurement.records import Trial
+from virtual_lab.trials import small_design
+
+SAME = ("name", "frequency_hz", "pressure_kpa", "offset", "heading_rad")
 
 
 def trials(count, frames=100):
@@ -11,7 +16,7 @@ def trials(count, frames=100):
             f"t{k}",
             (1.0, 1.5, 2.0)[k % 3],
             (41.0, 55.0)[k % 2],
-            0.0,
+            0.4 * (k // 6),
             1.57,
             0.0,
             frames / 50,
@@ -35,8 +40,30 @@ def test_sealed_trials_spread_over_conditions():
     assert len({t.frequency_hz for t in split.sealed}) == 3
 
 
-def test_the_same_seed_seals_the_same_trials():
-    assert split_trials(trials(9), 3).sealed[0].name == split_trials(trials(9), 3).sealed[0].name
+def test_the_split_follows_from_the_gaits_not_from_order_or_names():
+    design = small_design(np.random.default_rng(0))
+    made = [replace(trials(1)[0], **{k: getattr(t, k) for k in SAME}) for t in design]
+    sealed = {gait_of(t) for t in split_trials(made).sealed}
+    turned = [replace(t, name=f"x{k}") for k, t in enumerate(reversed(made))]
+    assert {gait_of(t) for t in split_trials(turned).sealed} == sealed
+
+
+def test_replicates_are_sealed_with_their_gait():
+    design = small_design(np.random.default_rng(1))
+    made = [replace(trials(1)[0], **{k: getattr(t, k) for k in SAME}) for t in design]
+    split = split_trials(made)
+    assert split.new_gaits and len(split.sealed) == 3
+    assert not {gait_of(t) for t in split.sealed} & {gait_of(t) for t in split.open}
+    assert len(split.folds) == 3
+
+
+def test_one_gait_alone_is_split_by_direction_and_says_so():
+    one = [
+        replace(t, frequency_hz=1.0, pressure_kpa=41.0, offset=0.0, heading_rad=0.5 * k)
+        for k, t in enumerate(trials(8))
+    ]
+    split = split_trials(one)
+    assert split.enough and not split.new_gaits
 
 
 def test_a_trial_of_holes_is_left_out_with_a_reason():

@@ -1,0 +1,108 @@
+"""What to record where the data cannot be tested: trials that would show most effects."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from srs_opt.calibrate.candidates import all_candidates, fitted_coordinates
+from srs_opt.calibrate.experiment import Experiment, Point
+from srs_opt.calibrate.fit import start_point
+from srs_opt.calibrate.model import Model
+from srs_opt.calibrate.noise import Noise
+from srs_opt.calibrate.objective import priors, sum_eliminated
+from srs_opt.discrepancy.design import NOTHING, NextExperiment
+from srs_opt.discrepancy.examined import FALSE_NAME
+from srs_opt.errors import NoAnswerError
+from srs_opt.measurement.records import DataSet, Trial
+
+# a set of this many trials, of so many seconds or cycles each, finds three quarters of the effects
+TRIALS, SECONDS, CYCLES, RATE_HZ = 9, 3.0, 3, 60.0
+SPREAD = (0.75, 1.0, 1.25)  # times the middle frequency, where the set has too few gaits of its own
+OFFSETS = (-0.3, 0.0, 0.3)
+WEAKER = (0.8, 0.9, 1.0)  # times the largest pressure
+FALLBACK = (1.0, 48.0)  # Hz, kPa: where the set holds no gait at all
+
+
+def first_experiment(dataset: DataSet, noise: Noise, model: str | None = None) -> NextExperiment | None:
+    """Return the trials to record; their power is the median over the known effects at typical size.
+
+    What the set's own gaits (of trials or maps) can do is what is proposed, frequency and pressure within a
+    quarter of theirs.
+    """
+    from scipy.special import chdtri, chndtr
+
+    trials = _trials(dataset)
+    coordinates = fitted_coordinates(dataset.robot)
+    candidates = [c for c in all_candidates(dataset.robot.links) if not c.form.effect.bends]
+    sizes = [c.sizes[0] for c in candidates]
+    point = start_point((*coordinates, *sizes))
+    try:
+        experiment = Experiment(Model(dataset.robot, model), trials, noise)
+        grams = experiment.grams(
+            Point({**point.values, **{c.name: 0.0 for c in sizes}}), (*coordinates, *sizes)
+        )
+    except NoAnswerError:
+        return None
+    total, fitted = sum_eliminated(grams), len(coordinates)
+    precision, _ = priors(coordinates, point)
+    inner = np.linalg.pinv(total[:fitted, :fitted] + np.diag(precision), rcond=1e-12, hermitian=True)
+    limit = chdtri(1, FALSE_NAME / len(candidates))
+    powers: dict[str, float] = {}
+    for k, candidate in enumerate(candidates, fitted):
+        cross = total[:fitted, k]
+        gain = candidate.sizes[0].typical ** 2 * float(total[k, k] - cross @ inner @ cross)
+        found = float(1 - chndtr(limit, 1, max(gain, 1e-9)))
+        powers[candidate.effect] = min(found, powers.get(candidate.effect, 1.0))
+    sure = sum(p > 0.9 for p in powers.values())
+    frequencies = sorted({t.frequency_hz for t in trials})
+    pressures = sorted({t.pressure_kpa for t in trials})
+    what = (
+        f"record tracks of every link in {len(trials)} trials of {trials[0].duration_s:.2g} s "
+        f"({frequencies[0]:.3g} to {frequencies[-1]:.3g} Hz, {pressures[0]:.3g} to {pressures[-1]:.3g} kPa, "
+        f"straight and turning): they show {sure} of {len(powers)} known effects at typical size"
+    )
+    return NextExperiment(
+        what, (NOTHING, "any known effect"), round(float(np.median(list(powers.values()))), 3)
+    )
+
+
+def _trials(dataset: DataSet) -> list[Trial]:
+    gaits = _gaits(dataset)
+    duration_s = max(SECONDS, CYCLES / min(f for f, *_ in gaits))
+    time_s = np.arange(int(duration_s * RATE_HZ)) / RATE_HZ
+    unseen = np.zeros((time_s.size, dataset.robot.links, 2))
+    plain = Trial("", 1.0, 0.0, 0.0, 0.0, 0.0, duration_s, time_s, unseen)
+    return [
+        replace(
+            plain, name=f"t{k}", frequency_hz=f, pressure_kpa=p, offset=o, phase_lag_rad=lag,
+            heading_rad=k * np.pi / 2,
+        )
+        for k, (f, p, o, lag) in enumerate(gaits)
+    ]  # fmt: skip
+
+
+def _gaits(dataset: DataSet) -> Sequence[tuple[float, float, float, float]]:
+    """Return (frequency, pressure, offset, phase lag) of what to record."""
+    own = [
+        (t.frequency_hz, t.pressure_kpa, t.offset, t.phase_lag_rad)
+        for t in dataset.trials
+        if t.kind == "gait"
+    ]
+    own += [(m.frequency_hz, m.pressure_kpa, m.offset, m.phase_lag_rad) for m in dataset.maps]
+    own = sorted({g for g in own if g[0] > 0})
+    if len(own) >= TRIALS:
+        step = len(own) / TRIALS
+        return [own[int(k * step)] for k in range(TRIALS)]
+    frequency, pressure = FALLBACK
+    lag = np.pi / 2
+    if own:
+        frequency, pressure = float(np.median([g[0] for g in own])), max(g[1] for g in own)
+        lag = own[0][3]
+    return [
+        (frequency * SPREAD[i], pressure * WEAKER[(i + j) % 3], OFFSETS[j], lag)
+        for i in range(3)
+        for j in range(3)
+    ]

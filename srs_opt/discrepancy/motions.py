@@ -1,0 +1,82 @@
+"""What a residual means for who drives the robot: by how much the predicted speed and radius are wrong."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from srs_opt.calibrate.noise import track_of
+from srs_opt.measurement.records import Trial
+
+LEAST_STEP_M = 0.005  # advance per cycle from which a share of the speed means something
+LEAST_TURN_RAD = 0.2  # turn within the trial from which a radius means something
+
+
+def motion_errors(
+    trials: Sequence[Trial],
+    residuals: Sequence[np.ndarray],
+    tracks: Sequence[np.ndarray] | None = None,
+) -> tuple[float | None, float | None]:
+    """Return the root mean square errors of predicted speed and radius over the measured ones.
+
+    Both are taken from what moves from each instant to one gait cycle later, measured and predicted alike, so
+    that the start from rest counts in both.
+
+    Parameters
+    ----------
+    trials : sequence of Trial
+    residuals : sequence of array (T, 2 M)
+        Measured minus predicted.
+
+    Returns
+    -------
+    (float or None, float or None)
+        None where no trial advances (or turns) enough to tell.
+    """
+    speeds, radii = [], []
+    measured_tracks = [track_of(t) for t in trials] if tracks is None else tracks
+    for trial, track, residual in zip(trials, measured_tracks, residuals):
+        if track is None:
+            continue
+        measured = _advance(trial, track)
+        predicted = _advance(trial, track - residual)
+        if measured is None or predicted is None or measured[0] < LEAST_STEP_M:
+            continue
+        speeds.append(predicted[0] / measured[0] - 1)
+        cycles = (trial.time_s[-1] - trial.time_s[0]) / trial.period_s
+        if abs(measured[1]) * cycles >= LEAST_TURN_RAD and predicted[1] != 0:
+            radii.append(predicted[0] / measured[0] * measured[1] / predicted[1] - 1)
+    return _root_mean_square(speeds), _root_mean_square(radii)
+
+
+def _root_mean_square(values: Sequence[float]) -> float | None:
+    return float(np.sqrt(np.mean(np.square(values)))) if values else None
+
+
+def _advance(trial: Trial, track: np.ndarray) -> tuple[float, float] | None:
+    """Return advance (m) and turn (rad) per gait cycle, averaged over the trial."""
+    frame_s = float(np.median(np.diff(trial.time_s)))
+    if not math.isfinite(trial.period_s):
+        return None
+    cycle = round(trial.period_s / frame_s)
+    if not 0 < cycle <= len(track) // 2:
+        return None
+    places = track[:, 0::2] + 1j * track[:, 1::2]
+    now, then = places[:-cycle], places[cycle:]
+    both = np.isfinite(now) & np.isfinite(then)
+    seen = both.sum(axis=1)
+    now, then = (np.where(both, z, 0.0) for z in (now, then))
+    frames = seen > 0
+    centres = [z.sum(axis=1)[frames] / seen[frames] for z in (now, then)]
+    advance = float(np.abs(centres[1] - centres[0]).mean()) if frames.any() else 0.0
+    if places.shape[1] > 1:
+        bodies = [
+            np.where(both, z - (z.sum(axis=1) / np.maximum(seen, 1))[:, None], 0.0) for z in (now, then)
+        ]
+        turn = float(np.angle(np.sum(bodies[1] * np.conj(bodies[0]))))
+    else:
+        step = np.where(frames, then[:, 0] - now[:, 0], 0.0)
+        turn = float(np.angle(np.sum(step[cycle:] * np.conj(step[:-cycle])))) if len(step) > cycle else 0.0
+    return advance, turn

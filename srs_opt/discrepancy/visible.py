@@ -1,0 +1,134 @@
+"""How large a missing effect the data would have shown, for those that show none."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from srs_opt.calibrate.candidates import Candidate
+from srs_opt.calibrate.experiment import Experiment, Point
+from srs_opt.calibrate.noise import track_of
+from srs_opt.calibrate.objective import priors, sum_eliminated
+from srs_opt.discrepancy.examined import Examined, needed_gain
+from srs_opt.discrepancy.hypothesis import LARGE
+from srs_opt.discrepancy.motions import motion_errors
+from srs_opt.discrepancy.settings import SETTINGS, Settings
+from srs_opt.errors import NoAnswerError
+from srs_opt.measurement.records import Trial
+
+SURELY = 1.28  # standard deviations above the level of detection: found nine times in ten
+_TRIALS = 3  # on which the effects are played: each costs a simulation per effect
+
+
+@dataclass(frozen=True)
+class Visible:
+    """The smallest missing effect that would have been found nine times in ten, whatever it is.
+
+    Attributes
+    ----------
+    m : float or None
+        Root mean square by which it moves the markers after calibration has made up for what it can.
+    speed_share, radius_share : float or None
+        Changes of speed and radius over themselves.
+    not_seen : tuple of str
+        Effects that these data do not show at any plausible size.
+    """
+
+    m: float | None
+    speed_share: float | None
+    radius_share: float | None
+    not_seen: tuple[str, ...] = field(default=())
+
+    @property
+    def in_words(self) -> str:
+        """What may be said of what was not found."""
+        if self.m is None:
+            return ""
+        said = f"moves the markers by more than {1e3 * self.m:.2g} mm"
+        if self.speed_share is not None:
+            said += f", or changes the speed by more than {self.speed_share:.1%}"
+        said = f"any known effect that {said}, would have been seen"
+        return f"{said}, except {', '.join(self.not_seen)}" if self.not_seen else said
+
+
+def visible(
+    experiment: Experiment,
+    null: Examined,
+    candidates: Sequence[Candidate],
+    trials: Sequence[Trial],
+    settings: Settings = SETTINGS,
+) -> Visible:
+    """Return the smallest missing effect that the open trials would have shown, as seen on `trials`.
+
+    Every effect is played at the size at which it would have been found, at the place where it shows least,
+    with the calibrated parameters gone where the fit would take them.
+    """
+    lin = null.linearisation
+    total = sum_eliminated(lin.grams, lin.temper)
+    precision, _ = priors(lin.coordinates, lin.point)
+    fitted = range(lin.fitted)
+    inner = total[np.ix_(fitted, fitted)] + np.diag(precision[: lin.fitted])
+    inverse = np.linalg.pinv(inner, rcond=1e-12, hermitian=True)
+    played = _spread([t for t in trials if t.kind == "gait"] or trials)
+    sizes, unseen = {}, []
+    for effect in dict.fromkeys(c.effect for c in candidates):
+        places = [c for c in candidates if c.effect == effect]
+        found = [(_least(total, lin.column(c.sizes[0].name), inverse, c, len(null.scores)), c) for c in places
+                 if c.sizes[0].name in {k.name for k in lin.coordinates[lin.fitted :]}]  # fmt: skip
+        seen = [(s, c) for s, c in found if s <= LARGE * c.sizes[0].typical]
+        if found and not seen:
+            unseen.append(effect)
+        if seen:
+            sizes[effect] = max(seen, key=lambda pair: pair[0] / pair[1].sizes[0].typical)
+    point = null.hypothesis.fit.point
+    if not played:
+        return Visible(None, None, None, tuple(unseen))
+    before = experiment.residuals(played, Point(point.values))
+    tracks = [np.asarray(track_of(t)) for t in played]
+    figures = []
+    for size, candidate in sizes.values():
+        column = lin.column(candidate.sizes[0].name)
+        follow = -size * (inverse @ total[: lin.fitted, column])
+        values = dict(point.values)
+        for c, step in zip(lin.coordinates, follow):
+            values[c.name] = max(values.get(c.name, 0.0) + float(step), c.lower)
+        values[candidate.sizes[0].name] = size
+        values |= {c.name: c.start for c in candidate.scales}
+        try:
+            after = experiment.residuals(played, Point(values))
+        except NoAnswerError:
+            continue
+        moved = [b - a for a, b in zip(after, before)]
+        as_if = [t - b for t, b in zip(tracks, before)]
+        figures.append((float(np.sqrt(np.nanmean(np.concatenate([m.ravel() for m in moved]) ** 2))),
+                        *motion_errors(played, moved, as_if)))  # fmt: skip
+    return _largest(figures, settings, tuple(unseen))
+
+
+def _largest(
+    figures: Sequence[tuple[float | None, ...]], settings: Settings, unseen: tuple[str, ...]
+) -> Visible:
+    """Return the largest of each figure; no less than what is taken for no gap at all."""
+    floors = settings.negligible_m, settings.negligible_speed, settings.negligible_speed
+    columns = [[f for f in column if f is not None] for column in zip(*figures)] or [[], [], []]
+    largest = [max([*c, floor]) if c else None for c, floor in zip(columns, floors)]
+    return Visible(largest[0], largest[1], largest[2], unseen)
+
+
+def _least(total: np.ndarray, column: int, inverse: np.ndarray, candidate: Candidate, family: int) -> float:
+    """Return the size at which an effect is found nine times in ten."""
+    fitted = inverse.shape[0]
+    cross = total[:fitted, column]
+    information = float(total[column, column] - cross @ inverse @ cross)
+    if information <= 1e-9 * float(total[column, column]):
+        return float("inf")
+    return float((np.sqrt(needed_gain(candidate, family)) + SURELY) / np.sqrt(information))
+
+
+def _spread(trials: Sequence[Trial]) -> list[Trial]:
+    """Return a few trials, straight and turning."""
+    ordered = sorted(trials, key=lambda t: (t.offset, t.name))
+    step = max(len(ordered) / _TRIALS, 1.0)
+    return [ordered[int(k * step)] for k in range(min(_TRIALS, len(ordered)))]
