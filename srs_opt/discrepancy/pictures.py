@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from srs_opt.calibrate.noise import track_of
 from srs_opt.discrepancy.locate import misfit_by_trial
 from srs_opt.discrepancy.pipeline import Discrepancy
 from srs_opt.discrepancy.seal import sealed_residuals
@@ -23,9 +24,48 @@ def pictures(found: Discrepancy) -> list[Picture]:
     if found.null is None or found.best is None or found.experiment is None or found.selection is None:
         return []
     drawn = [_candidates(found), _trials(found)]
-    if found.split.sealed:
-        drawn.insert(0, _sealed(found))
-    return drawn
+    return [_sealed(found), *drawn] if found.split.sealed else drawn
+
+
+@styled
+def gap_picture(found: Discrepancy) -> Picture | None:
+    """Return the picture that shows the gap close: the sealed trial that shows it most."""
+    if found.experiment is None or found.null is None or found.selection is None or found.gap is None:
+        return None
+    trials = [t for t in found.split.sealed if t.name in found.gap.before.by_trial]
+    if not trials or not found.selection.best.candidates:
+        return None
+    trial = max(trials, key=lambda t: found.gap.before.by_trial[t.name])  # type: ignore[union-attr]
+    fits = [found.null.hypothesis.fit, found.selection.best.fit]
+    residuals = [sealed_residuals(found.experiment, f, [trial])[0] for f in fits]
+    track = np.asarray(track_of(trial))
+    figure = _figure(PAGE_IN, 2.9)
+    room, course = figure.subplots(1, 2, width_ratios=(1.0, 1.2))
+    last = int(np.flatnonzero(np.isfinite(track).all(axis=1))[-1]) if np.isfinite(track).all(1).any() else -1
+    measured = track.reshape(len(track), -1, 2)
+    for residual, label, colour in zip(residuals, ("calibration alone", "with the effect"), (BEFORE, AFTER)):
+        points = 1e3 * (track - residual).reshape(len(track), -1, 2)
+        room.plot(*np.nanmean(points, axis=1).T, color=colour, lw=0.8, alpha=0.6)
+        room.plot(*points[last].T, "-", color=colour, lw=2.0, label=label)
+        course.plot(trial.time_s, 1e3 * _rolling(residual), color=colour, label=label)
+    room.plot(*(1e3 * measured[last]).T, "o", mfc="none", color="k", ms=4, label="measured")
+    room.plot(*(1e3 * np.nanmean(measured, axis=1)).T, color="k", lw=0.8, ls=":")
+    room.set_aspect("equal", adjustable="datalim")
+    room.set_xlabel("x (mm)")
+    room.set_ylabel("y (mm)")
+    course.axhline(1e3 * found.gap.noise_floor, color="k", lw=0.8, ls="--", label="noise floor")
+    course.set_yscale("log")
+    course.set_xlabel("time (s)")
+    course.set_ylabel("distance to the markers (mm)")
+    course.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
+    room.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
+    return encoded(
+        figure,
+        f"The gap closes on {trial.name}",
+        f"A trial that no fit saw. Left: the body after {trial.time_s[last]:.1f} s, as measured and as "
+        "predicted with and without the effect (thin: the way of the markers' mean). Right: root mean square "
+        "distance per coordinate over a fifth of a second.",
+    )
 
 
 def _figure(width: float, height: float) -> Figure:

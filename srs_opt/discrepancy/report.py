@@ -9,9 +9,18 @@ from typing import Any
 
 from srs_opt.calibrate.result import bench_warnings
 from srs_opt.discrepancy.examined import Examined
-from srs_opt.discrepancy.pictures import pictures
+from srs_opt.discrepancy.pictures import gap_picture, pictures
 from srs_opt.discrepancy.pipeline import Discrepancy
-from srs_opt.discrepancy.verdict import NAMED, NAMED_IN_PART, NO_GAP, NOT_TESTABLE, ONE_OF, UNKNOWN
+from srs_opt.discrepancy.verdict import (
+    DESCRIBED,
+    NAMED,
+    NAMED_IN_PART,
+    NO_GAP,
+    NOT_TESTABLE,
+    ONE_OF,
+    UNKNOWN,
+)
+from srs_opt.discrepancy.words import in_words
 from srs_opt.figures import Picture
 from srs_opt.files import write_text
 from srs_opt.model.effects import known_effects
@@ -21,9 +30,11 @@ HEADLINES = {
     NAMED: "Named: {names}",
     NAMED_IN_PART: "Named in part: {names}",
     ONE_OF: "One of: {names}",
-    UNKNOWN: "A gap that no known effect explains",
+    DESCRIBED: "Described: {described}",
+    UNKNOWN: "A gap that nothing known explains well enough",
     NOT_TESTABLE: "Not testable with these data",
 }
+COLOURS = {NO_GAP: "#2a7", NAMED: "#26c", NAMED_IN_PART: "#26c", DESCRIBED: "#26c", ONE_OF: "#b80"}
 
 
 def write_report(
@@ -51,7 +62,12 @@ def write_report(
         " + ".join(a) for a in record["alternatives"]
     ]
     page = template.render(
-        headline=HEADLINES[record["verdict"]].format(names=" or ".join(n for n in names if n)),
+        headline=HEADLINES[record["verdict"]].format(
+            names=" or ".join(n for n in names if n), described=record["described"]
+        ),
+        colour=COLOURS.get(record["verdict"], "#888"),
+        sentences=in_words(found),
+        closing=gap_picture(found),
         answer=record,
         words=known_effects(),
         dataset=found.dataset,
@@ -121,7 +137,7 @@ def caveats(found: Discrepancy) -> list[str]:
             f"The set states {stated * 1e3:.2f} mm of marker noise; the tracks show "
             f"{found.sd_m * 1e3:.2f} mm, which is what was used."
         )
-    notes += [f"Trial {name} was left out: {why}." for name, why in found.split.left_out]
+    notes += [f"Trial {name} was set aside: {why}." for name, why in found.set_aside]
     if found.null is not None:
         notes += [f"Of calibration alone: {w}." for w in bench_warnings(found.null.hypothesis.fit.off_bench)]
     if found.best is not None and found.best.hypothesis.candidates:
@@ -131,8 +147,12 @@ def caveats(found: Discrepancy) -> list[str]:
     if found.best is not None and found.verdict.word in (NAMED, ONE_OF) and not found.best.adequate:
         notes.append(
             f"Something is left (p = {found.best.detection.p_value:.2g}), {how_much_is_left(found.best)}: "
-            "as little as the numerical smoothing of friction can leave, so that it does not count against "
-            "the name."
+            "too little to count against the name."
+        )
+    if not found.split.new_gaits:
+        notes.append(
+            "The set holds too few gaits to seal one: the sealed trials repeat gaits that were fitted: "
+            "a closed gap is no prediction of another gait."
         )
     if found.gap is not None and found.gap.ratio is None and found.verdict.word in (NAMED, ONE_OF):
         notes.append(

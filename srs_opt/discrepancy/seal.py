@@ -169,7 +169,7 @@ def odd_sealed(gap: Gap | None, settings: Settings = SETTINGS) -> dict[str, str]
     if not off or len(off) > max(1, gap.trials // 4):
         return {}
     return {
-        n: f"sealed; the model that predicts the other sealed trials within {1e3 * usual:.2g} mm misses it by "
+        n: f"sealed; the model that predicts the others within {1e3 * usual:.2g} mm misses it by "
         f"{1e3 * m:.2g} mm: look at its entry in the notebook"
         for n, m in off.items()
     }

@@ -75,7 +75,7 @@ def test_a_tether_is_named_and_closes_the_gap(tmp_path, capsys):
     assert rides["after"]["blind_end_away_m"] < 1e-6 < 0.05 < rides["before"]["blind_end_away_m"]
     assert rides["after"]["blind_clearance_m"] > 0.0049
     page = (tmp_path / "out" / "report.html").read_text()
-    assert page.count("data:image/png") == 4 and "In a maze" in page
+    assert page.count("data:image/png") == 5 and "In a maze" in page
     assert said["effects"][0]["look"] in page and "What acts alike on these data" in page
     assert "tether_drag" in page and "http" not in page and "data:image/png" in page
 
