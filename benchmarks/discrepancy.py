@@ -7,10 +7,10 @@ of systematic motion and 0.2 mm of noise that is correlated over 0.2 s.
 
 Kinds of sets: ``null`` (nothing hidden; bench values off, noise misstated), ``typical`` (one effect at 0.7 to
 1.4 times its typical size, place at random), ``third`` (a third of that), ``unlisted`` (an effect in no
-list), ``triple`` (gap bending, tether weight and a segment's bias at once), ``bad`` (one trial is not what the
-notebook says; in every other set an effect besides). Prints the confusion matrix and every rate with its 99 %
-Clopper-Pearson interval, beside what three simpler methods say of the same sets. Interrupted, it goes on where
-it was.
+list), ``triple`` (gap bending, tether weight and a segment's bias at once), ``bad`` (one trial is not what
+the notebook says; in every other set an effect besides). Prints the confusion matrix and every rate with its
+99 % Clopper-Pearson interval, beside what three simpler methods say of the same sets. Interrupted, it goes on
+where it was.
 """
 
 from __future__ import annotations

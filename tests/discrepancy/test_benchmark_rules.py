@@ -1,7 +1,18 @@
 """What the benchmark counts as right."""
 
 from benchmarks import stored
-from benchmarks.discrepancy import confusion, in_words, interval, plan, rates, right_class, right_name
+from benchmarks.discrepancy import (
+    bad_found,
+    confusion,
+    covered,
+    in_words,
+    interval,
+    plan,
+    rates,
+    right_class,
+    right_name,
+    wrong_name,
+)
 
 
 def row(hidden, verdict, named=(), alternatives=()):
@@ -10,6 +21,8 @@ def row(hidden, verdict, named=(), alternatives=()):
         "verdict": verdict,
         "named": list(named),
         "alternatives": list(alternatives),
+        "truth": [{"name": name, "size": 2.0} for name in hidden],
+        "effects": [{"name": name, "parameters": {"size": 2.3}, "sd": {"size": 0.2}} for name in named],
     }
 
 
@@ -29,6 +42,26 @@ def test_look_alikes_are_the_right_class():
     assert not right_class(row(["segment_bias"], "named", ["single_wheel_toe"]))
     assert not right_class(row(["segment_bias"], "named", ["head_mass"]))
     assert not right_class(row(["segment_bias"], "unknown"))
+
+
+def test_a_part_that_is_hidden_is_no_wrong_name_and_one_that_is_not_is():
+    assert not wrong_name(row(["a", "b"], "named_in_part", ["a"]))
+    assert wrong_name(row(["a"], "named_in_part", ["b"]))
+    assert wrong_name(row([], "named", ["b"]))
+    assert not wrong_name(row([], "unknown", ["b"]))
+
+
+def test_a_bad_trial_is_found_where_it_is_set_aside_or_contradicts():
+    bad = {**row([], "no_gap"), "wrong_trial": "t1"}
+    assert bad_found({**bad, "set_aside": [{"trial": "t1", "reason": "x"}]})
+    assert bad_found({**bad, "why": "trial t1 contradicts the others"})
+    assert not bad_found({**bad, "set_aside": [{"trial": "t11", "reason": "x"}]})
+
+
+def test_intervals_of_named_sizes_hold_the_truth_or_not():
+    near, far = row(["a"], "named", ["a"]), row(["a"], "named", ["a"])
+    far["effects"][0]["sd"]["size"] = 0.1
+    assert (covered(near), covered(far)) == ([True], [False])
 
 
 def test_the_plan_is_seeded_and_holds_every_kind():
