@@ -104,9 +104,8 @@ def _doubt(null: Examined, best: Examined, selection: Selection, gap: Gap | None
     left = f"something is left (p = {best.detection.p_value:.2g}, limit {ADEQUATE:g})"
     if gap is None or gap.share is None:
         return left
-    if gap.share > settings.left_share and not (
-        gap.after.m <= settings.small_m and gap.share <= settings.small_share
-    ):
+    nearly_all = gap.share <= settings.left_share and gap.after.m <= settings.left_m
+    if not nearly_all and not _small_rest(gap, settings):
         return f"{left}, {1e3 * gap.after.m:.2g} mm on the sealed trials or {gap.share:.0%} of the gap"
     if (gap.after.speed_share or 0.0) > settings.speed_share:
         return f"{left}: the speed is {gap.after.speed_share:.1%} off"
@@ -117,10 +116,14 @@ def _closed(gap: Gap, settings: Settings) -> bool:
     """Whether a set of effects that leaves nothing significant closes the gap on the sealed trials."""
     if gap.ratio is None or gap.interval is None:
         return False
-    if gap.after.m <= settings.small_m and (gap.share or 0.0) <= settings.small_share:
+    if _small_rest(gap, settings):
         return True
     near = gap.interval[0] <= settings.closed and gap.ratio <= settings.nearly_closed
     return gap.ratio <= settings.closed or near
+
+
+def _small_rest(gap: Gap, settings: Settings) -> bool:
+    return gap.after.m <= settings.small_m and (gap.share or 0.0) <= settings.small_share
 
 
 def _sure_in_part(selection: Selection, gap: Gap, settings: Settings, *, restricted: bool) -> bool:
