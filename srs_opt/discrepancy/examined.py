@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from srs_opt.calibrate.candidates import Candidate
+from srs_opt.calibrate.objective import excess_of
 from srs_opt.discrepancy.detect import Detection
 from srs_opt.discrepancy.functions import Group
 from srs_opt.discrepancy.hypothesis import Hypothesis
@@ -16,6 +17,7 @@ ADEQUATE = 0.01  # level at which a fitted model is rejected
 # for nothing known at a size that matters: gaits near a change of theirs show a thousandth of a wheel's toe.
 OF_NOISE, OF_GAP = 0.02, 0.01
 TELLING = 0.1  # of an effect's typical size
+PROMISED = 0.5  # share of what is left that an effect must promise to close for a search to go on
 FALSE_NAME = 0.002  # family-wise level for adding an effect
 
 
@@ -60,6 +62,20 @@ def explained(null: Examined, examined: Examined) -> bool:
     left = examined.hypothesis.fit.misfit_ratio - 1
     gap = null.hypothesis.fit.misfit_ratio - 1
     return left < OF_NOISE and left < OF_GAP * gap
+
+
+def explainable(examined: Examined) -> bool:
+    """Whether one more known effect, at a size that matters, promises to close half of what is left.
+
+    As the linearisation has it, the noise taken for as large as the misfit makes it.
+    """
+    fit = examined.hypothesis.fit
+    left = excess_of(fit.grams) / fit.temper
+    family = len(examined.scores)
+    return any(
+        s.relative_size >= TELLING and s.improvement > max(PROMISED * left, needed_gain(s.candidate, family))
+        for s in examined.scores
+    )
 
 
 def needed_gain(candidate: Candidate, family: int) -> float:

@@ -17,7 +17,7 @@ from srs_opt.calibrate.objective import priors, sum_eliminated
 from srs_opt.calibrate.slow import smooth_part
 from srs_opt.discrepancy.alike import Angles
 from srs_opt.discrepancy.detect import detect, project, with_shared
-from srs_opt.discrepancy.examined import TELLING, Examined, explained, needed_gain
+from srs_opt.discrepancy.examined import TELLING, Examined, explainable, explained, needed_gain
 from srs_opt.discrepancy.functions import ResidualFunctions
 from srs_opt.discrepancy.hypothesis import ITERATIONS, SMALL, Hypothesis, cost, fit_hypothesis, left_of, stuck
 from srs_opt.discrepancy.screen import Linearisation, Score, expected_start, screen
@@ -43,7 +43,6 @@ HOPELESS = 0.1  # share of the gap that the best known effects leave, from which
 # the same flexibility between 50 and 500 1/(N m^2), a tenth takes twice the iterations
 LEAP = 0.35
 FIRM = 10.0  # standard deviations from zero at which an effect is not superfluous, without a refit
-
 # angle at which a member of a pair of look-alikes that is well behind in the screen is refitted all the same:
 # far from the linearisation's point an effect does up to sin^2 of it of something else
 KIN_RAD = 0.8
@@ -235,7 +234,8 @@ class Search:
             before, current = current, self._pruned(self.examine(self._polished(better)))
             current = self.noise_aware(current)
             again = current.hypothesis.label == before.hypothesis.label
-            if again or self._settled(null, current) or stuck(before.hypothesis, current.hypothesis):
+            idle = stuck(before.hypothesis, current.hypothesis) and not explainable(current)
+            if again or idle or self._settled(null, current):
                 break
         return current, self._with_rivals()
 
@@ -264,7 +264,7 @@ class Search:
         if better is None or not self._worth(better, null.hypothesis):
             return null, False
         current = self.noise_aware(self._pruned(self.examine(self._polished(better))))
-        hopeless = left_of(start.hypothesis, best.hypothesis) > HOPELESS
+        hopeless = left_of(start.hypothesis, best.hypothesis) > HOPELESS and not explainable(current)
         return current, hopeless or self._settled(null, current)
 
     def _best_of_whole(self, tried: Sequence[Hypothesis]) -> Hypothesis | None:
