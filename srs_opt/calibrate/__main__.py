@@ -56,25 +56,7 @@ def run(options: argparse.Namespace) -> Answer:
     with executor(options.jobs, options.cluster) as where:
         found = calibrate(dataset, options.model, lambda message: say(options, message), where)
     path = save_robot(found.robot, options.out / "robot.yaml")
-    return Answer(_record(found), _summary(found), files=(path,))
-
-
-def _record(found: Calibration) -> dict[str, object]:
-    names = list(found.parameters)
-    return {
-        "parameters": found.parameters,
-        "sd": found.sd,
-        "unidentifiable": list(found.unidentifiable),
-        "misfit": {"before": found.before, "after": found.after},
-        "warnings": list(found.warnings),
-        "data": "tracks" if found.sd_with_tracks is None else "maps",
-        "sd_with_tracks": found.sd_with_tracks,
-        "correlation": {
-            a: {b: round(float(found.correlation[i, j]), 4) for j, b in enumerate(names)}
-            for i, a in enumerate(names)
-        },
-        "robot": found.robot.to_record(),
-    }
+    return Answer(found.to_dict(), _summary(found), files=(path,))
 
 
 def _summary(found: Calibration) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,14 +13,18 @@ from srs_opt.calibrate.candidates import entry_after
 from srs_opt.calibrate.coordinates import Coordinate
 from srs_opt.calibrate.fit import Fit
 from srs_opt.calibrate.noise import Noise
+from srs_opt.result import Result
 from srs_opt.robot import Robot
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 OFF_BENCH = 3.0  # standard deviations of the bench; by chance one value in 370 lies further off
 BLIND = 0.9  # posterior over prior deviation above which the data told nothing
 
 
-@dataclass(frozen=True)
-class Calibration:
+@dataclass(frozen=True, repr=False)
+class Calibration(Result):
     """A calibrated robot.
 
     Attributes
@@ -58,6 +63,34 @@ class Calibration:
     def warnings(self) -> tuple[str, ...]:
         """What a reader should not overlook: values far from where the bench had them."""
         return bench_warnings(self.off_bench)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON object of the command."""
+        names = list(self.parameters)
+        return {
+            "parameters": self.parameters,
+            "sd": self.sd,
+            "unidentifiable": list(self.unidentifiable),
+            "misfit": {"before": self.before, "after": self.after},
+            "warnings": list(self.warnings),
+            "data": "tracks" if self.sd_with_tracks is None else "maps",
+            "sd_with_tracks": self.sd_with_tracks,
+            "correlation": {
+                a: {b: round(float(self.correlation[i, j]), 4) for j, b in enumerate(names)}
+                for i, a in enumerate(names)
+            },
+            "robot": self.robot.to_record(),
+        }
+
+    def in_words(self) -> str:
+        """Return the misfit before and after, and what was calibrated."""
+        return f"misfit over noise {self.before:.3f} -> {self.after:.3f}; {', '.join(self.parameters)}"
+
+    def figure(self) -> Figure:
+        """Return a bar per value: its distance from the bench value, in deviations of the bench."""
+        from srs_opt.calibrate.figures import bench_figure
+
+        return bench_figure(self)
 
 
 def bench_warnings(off_bench: Mapping[str, float]) -> tuple[str, ...]:

@@ -51,9 +51,10 @@ def run(options: argparse.Namespace) -> Answer:
 
     from srs_opt.drive.calibration import NO_CALIBRATION, save_calibration
     from srs_opt.drive.drive import drive_from_map
-    from srs_opt.drive.figures import draw_reachable
+    from srs_opt.drive.figures import reachable_figure
     from srs_opt.drive.fit import calibrate_drive, load_measured_map
     from srs_opt.errors import InputError
+    from srs_opt.figures import save_figure
     from srs_opt.files import write_json
     from srs_opt.gait_map.grid import gait_map, grid_points, load_map, save_map
     from srs_opt.robot import load_robot
@@ -87,7 +88,7 @@ def run(options: argparse.Namespace) -> Answer:
     record = gait_record(chosen, calibration)
     files += [
         write_json(options.out / "gait.json", record),
-        *draw_reachable(drive, options.out / "reachable", chosen),
+        *save_figure(reachable_figure(drive, chosen), options.out / "reachable"),
     ]
     return Answer(record, _words(chosen), files=tuple(files))
 

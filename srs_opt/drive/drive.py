@@ -7,7 +7,8 @@ triangles of all sheets, their mirror images and their reversed waves is what th
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
@@ -17,15 +18,19 @@ from srs_opt.errors import InputError, OutOfReachError
 from srs_opt.gait import Gait, Wave
 from srs_opt.gait_map.grid import GaitMap
 from srs_opt.orbit.steady import Orbit, steady_gait
+from srs_opt.result import Result
 from srs_opt.robot import Robot
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 LEVER_M = 0.1  # weighs turn rates against speeds when distances between motions are taken
 MOST_M_S, MOST_RAD_S = 100.0, 1000.0  # far beyond any snake; geometry with 1e308 overflows
 _REFINEMENTS = 3
 
 
-@dataclass(frozen=True)
-class DriveGait:
+@dataclass(frozen=True, repr=False)
+class DriveGait(Result):
     """A gait for a wanted motion: the wave, its direction, and what it is expected to do.
 
     `speed_m_s` and `turn_rate_rad_s` are calibrated; `speed_sd_m_s` and `turn_rate_sd_rad_s` their
@@ -41,9 +46,32 @@ class DriveGait:
     speed_sd_m_s: float
     turn_rate_sd_rad_s: float
 
+    def to_dict(self) -> dict[str, Any]:
+        """Return the wave and the motion that it is expected to make."""
+        return {
+            "wave": asdict(self.wave),
+            "reverse": self.reverse,
+            "speed_m_s": self.speed_m_s,
+            "speed_sd_m_s": self.speed_sd_m_s,
+            "turn_rate_rad_s": self.turn_rate_rad_s,
+            "turn_rate_sd_rad_s": self.turn_rate_sd_rad_s,
+        }
 
-@dataclass(frozen=True)
-class Drive:
+    def in_words(self) -> str:
+        """Return the expected motion and the wave's frequency and pressure."""
+        wave, way = self.wave, "backwards" if self.reverse else "forward"
+        return (
+            f"{way} at {self.speed_m_s:+.3f} m/s, {self.turn_rate_rad_s:+.3f} rad/s by "
+            f"{wave.frequency_hz:.3f} Hz, {wave.pressure_kpa:.1f} kPa, offset {wave.offset[0]:+.3f}"
+        )
+
+    def figure(self) -> Figure:
+        """Return the gait sheet."""
+        return self.orbit.figure()
+
+
+@dataclass(frozen=True, repr=False)
+class Drive(Result):
     """Reachable motions of a robot with the gait behind each.
 
     Attributes
@@ -61,6 +89,28 @@ class Drive:
     corners: np.ndarray
     width: np.ndarray
     calibration: DriveCalibration = field(default=NO_CALIBRATION)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the calibration and the span of the motions within reach."""
+        speed, turn_rate = self.corners[..., 4], self.corners[..., 5]
+        return {
+            "robot": self.robot.name,
+            "model": self.model,
+            "calibration": asdict(self.calibration),
+            "speed_m_s": [float(speed.min()), float(speed.max())],
+            "turn_rate_rad_s": float(abs(turn_rate).max()),
+        }
+
+    def in_words(self) -> str:
+        """Return the greatest speed and turn rate within reach."""
+        speed, turn_rate = (float(abs(self.corners[..., k]).max()) for k in (4, 5))
+        return f"up to {speed:.3f} m/s and {turn_rate:.3f} rad/s, forward and backwards"
+
+    def figure(self) -> Figure:
+        """Return the reachable set of speed and turn rate."""
+        from srs_opt.drive.figures import reachable_figure
+
+        return reachable_figure(self)
 
     def reachable(self) -> shapely.Geometry:
         """Return the set of reachable (speed m/s, turn rate rad/s), forward, both sides."""

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import shapely
 import shapely.affinity
 
 from srs_opt.drive.drive import Drive, DriveGait
-from srs_opt.figures import COLOURS, fill_region, new_figure, save_figure, styled
+from srs_opt.figures import COLOURS, fill_region, new_figure, styled
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @styled
-def draw_reachable(drive: Drive, stem: Path, chosen: DriveGait | None = None) -> tuple[Path, Path]:
-    """Draw the reachable set of speed and turn rate, forward and reverse; return the files."""
+def reachable_figure(drive: Drive, chosen: DriveGait | None = None) -> Figure:
+    """Return the reachable set of speed and turn rate, forward and reverse."""
     figure, axes = new_figure(width_in=3.5, height_in=2.8)
     reachable = drive.reachable()
     for sign, colour, label in ((1, COLOURS[0], "forward"), (-1, COLOURS[1], "reverse")):
@@ -28,4 +31,4 @@ def draw_reachable(drive: Drive, stem: Path, chosen: DriveGait | None = None) ->
     axes.set_xlabel("speed (m/s), + forward")
     axes.set_ylabel("turn rate (rad/s), + left")
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, 1.18), ncols=2)
-    return save_figure(figure, stem)
+    return figure

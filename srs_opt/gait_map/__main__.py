@@ -34,7 +34,8 @@ def run(options: argparse.Namespace) -> Answer:
     """Compute the map and write the files."""
     import numpy as np
 
-    from srs_opt.gait_map.figures import draw_maps
+    from srs_opt.figures import save_figure
+    from srs_opt.gait_map.figures import map_figures
     from srs_opt.gait_map.grid import gait_map, grid_points, save_map
     from srs_opt.model.parameters import room_effects
     from srs_opt.robot import load_robot
@@ -56,7 +57,9 @@ def run(options: argparse.Namespace) -> Answer:
         jobs=options.jobs, cluster=options.cluster, quiet=options.quiet, resume=unfinished,
     )  # fmt: skip
     seconds = time.perf_counter() - started
-    files = [save_map(gaits, options.out / "map.csv"), *draw_maps(gaits, options.out)]
+    files = [save_map(gaits, options.out / "map.csv")]
+    for name, sheet in map_figures(gaits).items():
+        files += save_figure(sheet, options.out / name)
     shutil.rmtree(unfinished, ignore_errors=True)
     speed, radius = np.abs(gaits.column("speed_m_s")), np.abs(gaits.column("radius_m"))
     record: dict[str, Any] = {

@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from srs_opt.figures import PAGE_IN, SEQUENTIAL, new_figure, save_figure, styled
+from srs_opt.figures import PAGE_IN, SEQUENTIAL, new_figure, styled
 from srs_opt.gait_map.grid import GaitMap
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 _MOST_PANELS = 5
 
 
 @styled
-def draw_maps(gaits: GaitMap, folder: Path) -> list[Path]:
-    """Draw a sheet per phase lag: speed above, radius below, a column per offset; return the files."""
-    written: list[Path] = []
+def map_figures(gaits: GaitMap) -> dict[str, Figure]:
+    """Return a sheet per phase lag, by name: speed above, radius below, a column per offset."""
+    sheets: dict[str, Figure] = {}
     lags = np.unique(gaits.column("phase_lag_rad"))
     for lag in lags:
         at_lag = gaits.rows[gaits.column("phase_lag_rad") == lag]
@@ -27,11 +27,11 @@ def draw_maps(gaits: GaitMap, folder: Path) -> list[Path]:
         if min(np.unique(sheet.column(c)).size for c in ("frequency_hz", "pressure_kpa")) < 2:
             continue
         name = "map" if lags.size == 1 else f"map_lag{lag:.2f}"
-        written += _sheet(sheet, folder / name, lag)
-    return written
+        sheets[name] = _sheet(sheet, lag)
+    return sheets
 
 
-def _sheet(gaits: GaitMap, stem: Path, lag: float) -> tuple[Path, Path]:
+def _sheet(gaits: GaitMap, lag: float) -> Figure:
     offsets = np.unique(gaits.column("offset"))
     shown = offsets[np.linspace(0, offsets.size - 1, min(offsets.size, _MOST_PANELS)).round().astype(int)]
     turning = bool(np.isfinite(gaits.column("radius_m")).any())
@@ -50,7 +50,7 @@ def _sheet(gaits: GaitMap, stem: Path, lag: float) -> tuple[Path, Path]:
         if turning:
             radius = np.abs(part.column("radius_m"))
             _contours(axes[1, column], part, radius, "radius (m)")
-    return save_figure(figure, stem)
+    return figure
 
 
 def _contours(axes: Axes, part: GaitMap, values: np.ndarray, label: str) -> None:

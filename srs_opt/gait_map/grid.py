@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import IO
+from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,8 +17,12 @@ from srs_opt.files import write_with
 from srs_opt.gait import Wave
 from srs_opt.parallel import executor
 from srs_opt.parallel.sweep import Resume, sweep
+from srs_opt.result import Result
 from srs_opt.robot import Robot
 from srs_opt.table import first_error, read_table
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 SETTINGS = ("frequency_hz", "pressure_kpa", "offset", "phase_lag_rad")
 COLUMNS = (
@@ -34,8 +38,8 @@ LARGEST_MAP = 1_000_000
 _CHUNK = 96
 
 
-@dataclass(frozen=True)
-class GaitMap:
+@dataclass(frozen=True, repr=False)
+class GaitMap(Result):
     """Steady motion over (frequency, pressure, offset, lag); one row per gait, columns as in COLUMNS.
 
     `rows` is (n, 9); the radius is NaN where the robot runs straight.
@@ -46,6 +50,36 @@ class GaitMap:
     def column(self, name: str) -> np.ndarray:
         """Return one column, (n,)."""
         return self.rows[:, COLUMNS.index(name)]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the columns as lists; None where there is no value."""
+        columns = {name: self.column(name).tolist() for name in COLUMNS}
+        return {name: [v if math.isfinite(v) else None for v in values] for name, values in columns.items()}
+
+    def in_words(self) -> str:
+        """Return the number of gaits and the fastest of them."""
+        speed = np.abs(self.column("speed_m_s"))
+        fastest = f"fastest {np.nanmax(speed):.3f} m/s" if np.isfinite(speed).any() else "none of them steady"
+        return f"{len(self.rows)} gaits, {fastest}"
+
+    def save(self, path: Path | str) -> Path:
+        """Write map.csv, a row per gait."""
+        return save_map(self, path)
+
+    def figure(self) -> Figure:
+        """Return the sheet of the first phase lag: speed above, radius below, a column per offset.
+
+        Raises
+        ------
+        InputError
+            If the map has a single frequency or pressure.
+        """
+        from srs_opt.gait_map.figures import map_figures
+
+        sheets = map_figures(self)
+        if not sheets:
+            raise InputError("a map is drawn over at least two frequencies and two pressures")
+        return next(iter(sheets.values()))
 
 
 def grid_points(

@@ -213,9 +213,10 @@ def run(options: argparse.Namespace) -> Answer:
     import time
     from functools import partial
 
+    from srs_opt.figures import save_figure
     from srs_opt.files import write_json
     from srs_opt.gait_file import load_gait
-    from srs_opt.gait_opt.figures import draw_convergence, draw_gait
+    from srs_opt.gait_opt.figures import convergence_figure
     from srs_opt.gait_opt.free import search_free
     from srs_opt.gait_opt.report import record, summary
     from srs_opt.gait_opt.search import Where, search
@@ -262,8 +263,8 @@ def run(options: argparse.Namespace) -> Answer:
         good = good and all(opinion.agrees for opinion in opinions)
     files = [
         write_json(options.out / "gait.json", answer),
-        *draw_gait(problem.robots[0], problem.model, found.orbits[0], options.out / "gait"),
-        *draw_convergence(found, options.out / "convergence"),
+        *save_figure(found.figure(), options.out / "gait"),
+        *save_figure(convergence_figure(found), options.out / "convergence"),
     ]
     return Answer(answer, summary(answer), good, tuple(files))
 
@@ -280,11 +281,11 @@ def _run_table(options: argparse.Namespace) -> Answer:
 
     from srs_opt.controller.c_source import write_program
     from srs_opt.controller.program import Program
+    from srs_opt.figures import save_figure
     from srs_opt.gait_opt.catalogue import cached_table_path
     from srs_opt.gait_opt.entries import certified_table
     from srs_opt.gait_opt.export import write_csv
     from srs_opt.gait_opt.family import TABLE_PRESSURE_KPA, build_table
-    from srs_opt.gait_opt.figures import draw_pareto
     from srs_opt.gait_opt.goal import Limits
     from srs_opt.gait_opt.report import if_soft, soft_speeds
     from srs_opt.gait_opt.table import load_table, save_table
@@ -315,7 +316,7 @@ def _run_table(options: argparse.Namespace) -> Answer:
         save_table(table, options.out / "gait_table.json"),
         write_csv(table, options.out / "gait_table.csv"),
         write_program(Program.of_table(table, options.tick), options.out / "gait_table.h"),
-        *draw_pareto(table, options.out / "pareto"),
+        *save_figure(table.figure(), options.out / "pareto"),
     ]
     if (
         limits == Limits(pressure_kpa=TABLE_PRESSURE_KPA) and not options.warm

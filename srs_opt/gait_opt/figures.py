@@ -1,152 +1,24 @@
-"""Pictures: the gait sheet, the convergence of a search, the Pareto front of a table."""
+"""Pictures: the convergence of a search, the Pareto front of a table."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from srs_opt.figures import (
-    COLOURS,
-    LEFT,
-    PAGE_IN,
-    RIGHT,
-    SEQUENTIAL,
-    draw_body,
-    new_figure,
-    save_figure,
-    styled,
-)
+from srs_opt.figures import COLOURS, SEQUENTIAL, new_figure, styled
 from srs_opt.gait_opt.search import Found
 from srs_opt.gait_opt.table import GaitTable
-from srs_opt.orbit.motion import centre_of_rotation
-from srs_opt.orbit.steady import Orbit, body_over_cycle, integrator
-from srs_opt.robot import Robot
-from srs_opt.simulate.rosenbrock import VELOCITY, WORK
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
-_STROBES = 5
 _MM = 1e3
 
 
 @styled
-def draw_gait(robot: Robot, model: str, orbit: Orbit, stem: Path) -> tuple[Path, Path]:
-    """Write the gait sheet: body, valves, curvatures, speeds, envelope and friction work over a cycle."""
-    figure, axes = new_figure(3, 2, width_in=PAGE_IN, height_in=6.4)
-    _body(axes[0, 0], robot, model, orbit)
-    _valves(axes[0, 1], orbit)
-    _curvatures(axes[1, 0], orbit)
-    _speeds(axes[1, 1], orbit)
-    _reach(axes[2, 0], robot, model, orbit)
-    _work(axes[2, 1], orbit)
-    radius = "straight" if orbit.radius_m is None else f"radius {orbit.radius_m:.3f} m"
-    gait = orbit.gait
-    figure.suptitle(
-        f"{robot.name}: {orbit.speed_m_s:.3f} m/s, {radius}; {gait.frequency_hz:.2f} Hz, "
-        f"{gait.pressure_kpa:.1f} kPa"
-    )
-    return save_figure(figure, stem)
-
-
-def _body(axes: Axes, robot: Robot, model: str, orbit: Orbit) -> None:
-    from matplotlib import colormaps
-
-    from srs_opt.orbit.motion import rotate
-
-    run = integrator(robot, model)
-    at, poses, x, y = body_over_cycle(run, orbit.time_s, orbit.pose, orbit.kappa)
-    turn_rate = orbit.motion.displacement[2] / orbit.gait.period_s
-    heading = (poses[:, 2] - turn_rate * at).mean()
-    colours = colormaps[SEQUENTIAL]
-    for k, i in enumerate(np.linspace(0, at.size - 1, _STROBES).astype(int)):
-        # the mean turn taken out, and one below the other, so that the strobe does not cover itself
-        across, down = x[:, i] - poses[i, 0], y[:, i] - poses[i, 1]
-        body_x, body_y = rotate(-heading - turn_rate * at[i], across, down)
-        body_x, body_y = body_x + orbit.speed_m_s * at[i], body_y - 1.1 * k * sum(orbit.envelope_m)
-        draw_body(axes, body_x, body_y, robot.body_width_m, facecolor=colours(k / _STROBES))
-        axes.plot(body_x[-1], body_y[-1], "o", color="black", markersize=2)
-        axes.annotate(f"{at[i]:.2f} s", (body_x.min() - robot.body_width_m / 2, body_y[0]), (-3, 0),
-                      textcoords="offset points", ha="right", va="center", fontsize=6)  # fmt: skip
-    axes.spines["left"].set_visible(False)
-    axes.set(aspect="equal", xlabel="along the path (m)", yticks=[], title="Body over a cycle (head: dot)")
-
-
-def _valves(axes: Axes, orbit: Orbit) -> None:
-    gait = orbit.gait
-    for i, pairs in enumerate(gait.intervals, start=1):
-        axes.barh(i, gait.period_s, height=0.7, color=RIGHT, alpha=0.85)
-        for on, off in pairs:
-            spans = [(on, off)] if on < off else [(on, gait.period_s), (0.0, off)]
-            for a, b in spans:
-                axes.barh(i, b - a, left=a, height=0.7, color=LEFT)
-    axes.barh(0, 0, color=LEFT, label="left chamber")
-    axes.barh(0, 0, color=RIGHT, label="right chamber")
-    axes.set(xlabel="time (s)", ylabel="segment (1: tail)", xlim=(0, gait.period_s), title="Valves")
-    axes.set_ylim(0.4, len(gait.intervals) + 0.6)
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.28), ncols=2)
-
-
-def _curvatures(axes: Axes, orbit: Orbit) -> None:
-    for i, curve in enumerate(orbit.kappa.T):
-        axes.plot(orbit.time_s, curve, color=COLOURS[i % len(COLOURS)], label=f"{i + 1}")
-    axes.set(
-        xlabel="time (s)", ylabel="curvature (1/m)", xlim=(0, orbit.time_s[-1]), title="Curvatures by segment"
-    )
-    if orbit.kappa.shape[1] <= len(COLOURS):
-        axes.legend(ncols=orbit.kappa.shape[1], loc="lower center", bbox_to_anchor=(0.5, -0.5))
-
-
-def _speeds(axes: Axes, orbit: Orbit) -> None:
-    solution = orbit.solution
-    velocity = np.concatenate([solution.start[VELOCITY][:, None], solution.states[VELOCITY]], axis=1)
-    axes.plot(orbit.time_s, velocity[0], color=COLOURS[0], label="along the body")
-    axes.plot(orbit.time_s, velocity[1], color=COLOURS[1], label="across")
-    axes.axhline(orbit.speed_m_s, color="black", linewidth=0.8, linestyle="--", label="mean")
-    axes.set(xlabel="time (s)", ylabel="speed (m/s)", xlim=(0, orbit.time_s[-1]), title="Centre of mass")
-    axes.legend(ncols=3, loc="lower center", bbox_to_anchor=(0.5, -0.5))
-
-
-def _reach(axes: Axes, robot: Robot, model: str, orbit: Orbit) -> None:
-    run = integrator(robot, model)
-    at, poses, x, y = body_over_cycle(run, orbit.time_s, orbit.pose, orbit.kappa, 97)
-    centre = centre_of_rotation(orbit.motion.displacement)
-    right, left = orbit.envelope_m
-    if orbit.radius_m is None or centre is None:
-        along = np.array(orbit.motion.displacement[:2]) * np.sign(orbit.speed_m_s)
-        along = along / max(np.hypot(*along), 1e-12)
-        middle = poses[:, :2].mean(axis=0)
-        lateral = along[0] * (y - middle[1]) - along[1] * (x - middle[0])
-    else:
-        lateral = np.sign(orbit.radius_m) * (abs(orbit.radius_m) - np.hypot(x - centre[0], y - centre[1]))
-    half = robot.body_width_m / 2
-    low, high = lateral.min(axis=0) - half, lateral.max(axis=0) + half
-    axes.fill_between(at, _MM * low, _MM * high, color=COLOURS[5], alpha=0.6, linewidth=0)
-    for value in (-right, left):
-        axes.axhline(_MM * value, color="black", linewidth=0.8, linestyle="--")
-    axes.set(
-        xlabel="time (s)", ylabel="across the path (mm)", xlim=(0, at[-1]), title="Swept band (left is up)"
-    )
-
-
-def _work(axes: Axes, orbit: Orbit) -> None:
-    solution = orbit.solution
-    work = np.concatenate([[0.0], solution.states[WORK]])
-    axes.plot(orbit.time_s, _MM * work, color=COLOURS[2])
-    axes.set(
-        xlabel="time (s)",
-        ylabel="friction work (mJ)",
-        xlim=(0, orbit.time_s[-1]),
-        title="Work against friction",
-    )
-    axes.set_ylim(bottom=0)
-
-
-@styled
-def draw_convergence(found: Found, stem: Path) -> tuple[Path, Path]:
-    """Write how the winning start climbed the friction ladder, collocation beside simulation."""
+def convergence_figure(found: Found) -> Figure:
+    """Show how the winning start climbed the friction ladder, collocation beside simulation."""
     figure, (top, bottom) = new_figure(2, 1, width_in=4.6, height_in=4.0, sharex=True)
     steps = found.steps
     number = np.arange(1, len(steps) + 1)
@@ -161,12 +33,12 @@ def draw_convergence(found: Found, stem: Path) -> tuple[Path, Path]:
     bottom.axhline(0.005, color="black", linewidth=0.8, linestyle="--")
     bottom.set(ylabel="relative error", xlabel="smoothing speed of friction (mm/s), elements")
     bottom.set_xticks(number, [f"{_MM * s.rung.friction_speed_m_s:g}\n{s.elements}" for s in steps])
-    return save_figure(figure, stem)
+    return figure
 
 
 @styled
-def draw_pareto(table: GaitTable, stem: Path) -> tuple[Path, Path]:
-    """Write speed against the path's bend, forward gaits coloured by the width of their swept band."""
+def pareto_figure(table: GaitTable) -> Figure:
+    """Show speed against the path's bend, forward gaits coloured by the width of their swept band."""
     figure, axes = new_figure(width_in=4.8, height_in=3.2)
     forward = [g for g in table.gaits if g.speed_m_s > 0]
     bend = [0.0 if g.radius_m is None else 1 / g.radius_m for g in forward]
@@ -175,4 +47,4 @@ def draw_pareto(table: GaitTable, stem: Path) -> tuple[Path, Path]:
     figure.colorbar(points, label="swept band (mm)")
     axes.set(xlabel="bend of the path, 1/radius (1/m), + left", ylabel="speed (m/s)")
     axes.set_ylim(bottom=0)
-    return save_figure(figure, stem)
+    return figure

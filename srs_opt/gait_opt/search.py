@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait
@@ -26,6 +26,10 @@ from srs_opt.gait_opt.starts import starting_gaits, steered
 from srs_opt.orbit.steady import Orbit
 from srs_opt.parallel import executor
 from srs_opt.parallel.sweep import Resume, sweep
+from srs_opt.result import Result
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Say = Callable[[str], None]
 _CARRIED = 2  # starts that are carried to the robot's own friction
@@ -50,8 +54,8 @@ class Where:
 HERE = Where()
 
 
-@dataclass(frozen=True)
-class Found:
+@dataclass(frozen=True, repr=False)
+class Found(Result):
     """The result of a search.
 
     Attributes
@@ -87,6 +91,29 @@ class Found:
     interrupted: bool
     prices: tuple[Price, ...] = ()
     from_rest: FromRest | None = None
+
+    @property
+    def speed_m_s(self) -> float:
+        """Speed of the gait on the first robot."""
+        return self.orbits[0].speed_m_s
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the gait, its motion on every robot, and whether the certificate passed."""
+        return {
+            "gait": self.gait.record(),
+            "robots": [orbit.to_dict() for orbit in self.orbits],
+            "certified": self.certificate.passed,
+            "starts": list(self.merits),
+            "seconds": self.seconds,
+        }
+
+    def in_words(self) -> str:
+        """Return what the gait does on the first robot, and what the certificate says."""
+        return f"{self.orbits[0].in_words()}; certificate {'passed' if self.certificate.passed else 'FAILED'}"
+
+    def figure(self) -> Figure:
+        """Return the gait sheet on the first robot."""
+        return self.orbits[0].figure()
 
 
 def search(

@@ -6,7 +6,7 @@ import json
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,7 +15,11 @@ from srs_opt.errors import InputError
 from srs_opt.files import write_text
 from srs_opt.gait import Gait
 from srs_opt.orbit.steady import Orbit
+from srs_opt.result import Result
 from srs_opt.robot import Robot
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 VERSION = 1
 # Half the step between the table's speeds; half of it refuses what is nearly there, double plays what is not.
@@ -129,8 +133,8 @@ class TableGait:
         )
 
 
-@dataclass(frozen=True)
-class GaitTable:
+@dataclass(frozen=True, repr=False)
+class GaitTable(Result):
     """Gaits of one robot under one model; `fingerprint` is the robot's."""
 
     robot_name: str
@@ -163,17 +167,31 @@ class GaitTable:
         best = int(distance.argmin())
         return self.gaits[best] if distance[best] <= tolerance_m_s else None
 
+    def to_dict(self) -> dict[str, Any]:
+        """Return the table as gait_table.json holds it."""
+        return {
+            "version": VERSION,
+            "robot": self.robot_name,
+            "fingerprint": self.fingerprint,
+            "model": self.model,
+            "gaits": [g.record() for g in self.gaits],
+        }
+
+    def in_words(self) -> str:
+        """Return the number of gaits and the fastest of them."""
+        fastest = max((g.speed_m_s for g in self.gaits), default=0.0)
+        return f"{len(self.gaits)} gaits of robot '{self.robot_name}' up to {fastest:.3f} m/s"
+
+    def figure(self) -> Figure:
+        """Return speed against the path's bend, coloured by the width of the swept band."""
+        from srs_opt.gait_opt.figures import pareto_figure
+
+        return pareto_figure(self)
+
 
 def save_table(table: GaitTable, path: Path | str) -> Path:
     """Write a gait table as JSON (schema: gait_table.schema.json)."""
-    record = {
-        "version": VERSION,
-        "robot": table.robot_name,
-        "fingerprint": table.fingerprint,
-        "model": table.model,
-        "gaits": [g.record() for g in table.gaits],
-    }
-    return write_text(path, json.dumps(record, indent=1, allow_nan=False) + "\n")
+    return write_text(path, json.dumps(table.to_dict(), indent=1, allow_nan=False) + "\n")
 
 
 def load_table(path: Path | str, robot: Robot | None = None) -> GaitTable:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache, partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,22 +17,28 @@ from srs_opt.orbit.motion import CycleMotion, cycle_motion, rotate
 from srs_opt.orbit.solve import PeriodicSolution, search_orbit
 from srs_opt.parallel import executor
 from srs_opt.parallel.sweep import sweep
+from srs_opt.result import Result
 from srs_opt.robot import Robot
 from srs_opt.simulate.integrate import TOLERANCE_M_S, Integrator
 from srs_opt.simulate.rosenbrock import WORK
 from srs_opt.simulate.shapes import centre_lines
 from srs_opt.simulate.together import Search, alone, together
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 CHAINS, CHAIN = 8, 12  # gaits searched side by side, and one after the other
 SAMPLES = 48  # body shapes per cycle for the envelope
 
 
-@dataclass(frozen=True)
-class Orbit:
+@dataclass(frozen=True, repr=False)
+class Orbit(Result):
     """The relative periodic orbit of a gait.
 
     Attributes
     ----------
+    robot : Robot
+    model : str
     gait : Gait
     motion : CycleMotion
         Speed, turn rate, radius, envelope.
@@ -49,6 +56,8 @@ class Orbit:
     solution : PeriodicSolution
     """
 
+    robot: Robot
+    model: str
     gait: Gait
     motion: CycleMotion
     work_j: float
@@ -89,6 +98,35 @@ class Orbit:
     def largest_multiplier(self) -> float:
         """Largest modulus of all Floquet multipliers (shape and body velocity); below 1: stable."""
         return max(float(abs(self.multipliers[0])), self.shape_multiplier)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the gait and its steady motion."""
+        right, left = self.envelope_m
+        return {
+            "robot": self.robot.name,
+            "model": self.model,
+            "gait": self.gait.record(),
+            "speed_m_s": self.speed_m_s,
+            "turn_rate_rad_s": self.turn_rate_rad_s,
+            "radius_m": self.radius_m,
+            "envelope_m": {"right": right, "left": left},
+            "work_j": self.work_j,
+            "largest_multiplier": self.largest_multiplier,
+        }
+
+    def in_words(self) -> str:
+        """Return the steady motion in one line."""
+        way = "straight" if self.radius_m is None else f"radius {self.radius_m:+.3f} m"
+        gait = self.gait
+        return (
+            f"{self.speed_m_s:.4f} m/s, {way}, at {gait.frequency_hz:.3f} Hz and {gait.pressure_kpa:.2f} kPa"
+        )
+
+    def figure(self) -> Figure:
+        """Return the gait sheet: body, valves, curvatures, speeds, swept band, work over a cycle."""
+        from srs_opt.orbit.figures import gait_figure
+
+        return gait_figure(self)
 
 
 @lru_cache(maxsize=64)
@@ -200,6 +238,8 @@ def orbit_of(run: Integrator, gait: Gait, solution: PeriodicSolution) -> Orbit:
     motion = cycle_motion(*body_over_cycle(run, time_s, pose, kappa), robot.body_width_m)
     multipliers = np.linalg.eigvals(solution.monodromy)
     return Orbit(
+        robot=robot,
+        model=run.structure.model,
         gait=gait,
         motion=motion,
         work_j=float(solution.states[WORK, -1]),

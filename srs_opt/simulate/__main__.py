@@ -65,11 +65,11 @@ def build_parser() -> Parser:
 
 def run(options: argparse.Namespace) -> Answer:
     """Simulate and write the files."""
+    from srs_opt.figures import save_figure
     from srs_opt.gait import Wave
     from srs_opt.gait_file import load_gait
     from srs_opt.robot import load_robot
     from srs_opt.simulate.export import write_trajectory
-    from srs_opt.simulate.figures import draw_simulation
     from srs_opt.simulate.run import simulate, simulate_valves
     from srs_opt.simulate.valve_file import read_valves
 
@@ -86,16 +86,8 @@ def run(options: argparse.Namespace) -> Answer:
         gait = Wave.uniform(robot.segments, options.frequency, options.pressure, lag, options.offset).gait()
         result = simulate(robot, gait, options.duration, model, options.heading)
     files = [write_trajectory(result.trajectory, options.out / "trajectory.csv")]
-    files += draw_simulation(robot, model, result, options.out / "trajectory")
-    record = {
-        "speed_m_s": result.speed_m_s,
-        "turn_rate_rad_s": result.turn_rate_rad_s,
-        "radius_m": result.radius_m,
-        "error_estimate": result.error_estimate,
-        "wall_s": result.wall_s,
-        "compile_s": result.compile_s,
-    }
-    return Answer(record, _words(record), files=tuple(files))
+    files += save_figure(result.figure(), options.out / "trajectory")
+    return Answer(result.to_dict(), result.in_words(), files=tuple(files))
 
 
 def _in_gait(options: argparse.Namespace, robot: Robot, model: str) -> np.ndarray | None:
@@ -106,20 +98,6 @@ def _in_gait(options: argparse.Namespace, robot: Robot, model: str) -> np.ndarra
     if not options.gait:
         return None
     return travelling(robot, load_gait(options.gait, options.pressure), model)
-
-
-def _words(record: dict[str, float | None]) -> str:
-    speed, turn, radius = record["speed_m_s"], record["turn_rate_rad_s"], record["radius_m"]
-    if speed is None or turn is None:
-        return "simulated; fewer than two whole cycles, so no mean speed"
-    way = (
-        "straight"
-        if radius is None
-        else f"radius {abs(radius):.3f} m to the {'left' if radius > 0 else 'right'}"
-    )
-    error = record["error_estimate"]
-    trust = f" (numerical error about {error:.1e})" if error is not None else ""
-    return f"speed {speed:.4f} m/s, turn rate {turn:+.4f} rad/s, {way}{trust}"
 
 
 def main(argv: list[str] | None = None) -> int:

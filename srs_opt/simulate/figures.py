@@ -2,27 +2,29 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from srs_opt.figures import COLOURS, PAGE_IN, draw_body, new_figure, save_figure, styled
+from srs_opt.figures import COLOURS, PAGE_IN, draw_body, new_figure, styled
 from srs_opt.orbit.motion import rotate
-from srs_opt.robot import Robot
 from srs_opt.simulate.integrate import Integrator
 from srs_opt.simulate.run import Simulation
 from srs_opt.simulate.shapes import centre_lines
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 
 @styled
-def draw_simulation(robot: Robot, model: str, result: Simulation, stem: Path) -> tuple[Path, Path]:
-    """Draw path, body and curvatures; return the files written."""
-    path = result.trajectory
+def simulation_figure(result: Simulation) -> Figure:
+    """Return the picture of path, body and curvatures."""
+    robot, path = result.robot, result.trajectory
     figure, (room, bend) = new_figure(
         1, 2, width_in=PAGE_IN, height_in=2.8, gridspec_kw={"width_ratios": [1.3, 1]}
     )
     room.plot(path.pose[:, 0], path.pose[:, 1], color=COLOURS[6], linewidth=0.8, label="centre of mass")
-    run = Integrator(robot, model)
+    run = Integrator(robot, result.model)
     shown = np.linspace(0, _until(result), 7)
     pose, kappa = path.at(shown)
     x, y = centre_lines(run, kappa).T
@@ -50,7 +52,7 @@ def draw_simulation(robot: Robot, model: str, result: Simulation, stem: Path) ->
     bend.set_ylabel("curvature (1/m), + left")
     if robot.segments <= 8:
         bend.legend(ncols=2, loc="upper center", bbox_to_anchor=(0.5, 1.22))
-    return save_figure(figure, stem)
+    return figure
 
 
 def _until(result: Simulation) -> float:

@@ -4,29 +4,36 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from srs_opt.errors import InputError
 from srs_opt.gait import Gait, check_gait
 from srs_opt.orbit.motion import CycleMotion, cycle_motion, rotate
+from srs_opt.result import Result
 from srs_opt.robot import Robot
 from srs_opt.simulate import compiled
 from srs_opt.simulate.integrate import TOLERANCE_M_S, Integrator, Trajectory
 from srs_opt.simulate.shapes import centre_lines
 from srs_opt.simulate.timeline import Timeline
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 LONGEST_S, MOST_CYCLES = 100_000.0, 1_000_000
 LEAST_CYCLES = 1e-6  # shorter ones drown in rounding
 _CHECKED_CYCLES = 4
 
 
-@dataclass(frozen=True)
-class Simulation:
+@dataclass(frozen=True, repr=False)
+class Simulation(Result):
     """A simulated trial.
 
     Attributes
     ----------
+    robot : Robot
+    model : str
     gait : Gait or None
         None where valves were played once.
     trajectory : Trajectory
@@ -39,6 +46,8 @@ class Simulation:
     wall_s, compile_s : float
     """
 
+    robot: Robot
+    model: str
     gait: Gait | None
     trajectory: Trajectory
     speed_m_s: float | None
@@ -47,6 +56,28 @@ class Simulation:
     error_estimate: float | None
     wall_s: float
     compile_s: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the means and how far to trust them; `trajectory` holds the motion."""
+        keys = ("speed_m_s", "turn_rate_rad_s", "radius_m", "error_estimate", "wall_s", "compile_s")
+        return {key: getattr(self, key) for key in keys}
+
+    def in_words(self) -> str:
+        """Return the mean motion in one line."""
+        if self.speed_m_s is None or self.turn_rate_rad_s is None:
+            return "simulated; fewer than two whole cycles, so no mean speed"
+        way = "straight"
+        if self.radius_m is not None:
+            way = f"radius {abs(self.radius_m):.3f} m to the {'left' if self.radius_m > 0 else 'right'}"
+        error = self.error_estimate
+        trust = f" (numerical error about {error:.1e})" if error is not None else ""
+        return f"speed {self.speed_m_s:.4f} m/s, turn rate {self.turn_rate_rad_s:+.4f} rad/s, {way}{trust}"
+
+    def figure(self) -> Figure:
+        """Return the picture of path, body and curvatures."""
+        from srs_opt.simulate.figures import simulation_figure
+
+        return simulation_figure(self)
 
 
 def simulate(
@@ -81,9 +112,9 @@ def simulate(
     wall = time.perf_counter() - started
     speed, turn_rate, radius = _second_half(run, trajectory, gait)
     error = _error_estimate(run, start, gait, duration_s)
-    return Simulation(
-        gait, trajectory, speed, turn_rate, radius, error, wall, compiled.compile_seconds - before
-    )
+    compile_s = compiled.compile_seconds - before
+    name = model or robot.own_model
+    return Simulation(robot, name, gait, trajectory, speed, turn_rate, radius, error, wall, compile_s)
 
 
 def simulate_valves(
@@ -95,7 +126,9 @@ def simulate_valves(
     began = time.perf_counter()
     trajectory = run.run(timeline, run.rest() if start is None else start)
     wall = time.perf_counter() - began
-    return Simulation(None, trajectory, None, None, None, None, wall, compiled.compile_seconds - before)
+    compile_s = compiled.compile_seconds - before
+    name = model or robot.own_model
+    return Simulation(robot, name, None, trajectory, None, None, None, None, wall, compile_s)
 
 
 def _second_half(
