@@ -21,6 +21,7 @@ from srs_opt.gait_opt.ladder import climb, ladder
 from srs_opt.gait_opt.report import wave_parameters
 from srs_opt.gait_opt.starts import starting_gaits
 from srs_opt.orbit import steady
+from srs_opt.orbit.body import integrator
 from srs_opt.orbit.sensitivity import sensitivity
 from srs_opt.orbit.steady import Orbit, steady_gait, steady_gaits
 from srs_opt.robot import wpi_srs
@@ -80,7 +81,7 @@ def watched() -> Iterator[Watch]:
     """Count what is simulated inside; leave as soon as a gait at the robot's own friction is good enough."""
     watch = Watch()
     own_search, own_run, own_solve = steady._search, Kernel.run, program_module.Program.solve
-    frequency = steady.integrator(ROBOT).parameters.names.index("frequency_hz")
+    frequency = integrator(ROBOT).parameters.names.index("frequency_hz")
 
     def search(run, gait, tolerance, guess):  # type: ignore[no-untyped-def]
         orbit = yield from own_search(run, gait, tolerance, guess)

@@ -24,10 +24,11 @@ from srs_opt.calibrate.fit import start_point
 from srs_opt.calibrate.model import Model
 from srs_opt.calibrate.objective import sum_eliminated
 from srs_opt.gait import Wave
-from srs_opt.gait_map.grid import gait_map, grid_points
+from srs_opt.gait_map.grid import grid_points, map_at
 from srs_opt.gait_opt.catalogue import shipped_table
+from srs_opt.orbit.body import integrator
 from srs_opt.orbit.laps import monodromy_kernel
-from srs_opt.orbit.steady import integrator, steady_gaits
+from srs_opt.orbit.steady import steady_gaits
 from srs_opt.robot import wpi_srs
 from srs_opt.simulate import compiled
 from srs_opt.simulate.integrate import Integrator
@@ -117,7 +118,7 @@ def _points(sizes: list[int]) -> dict[str, Curve]:
     costs = []
     for size in sizes:
         points = grid_points(list(np.linspace(1, 2, size)), [48.0], [0.4], [math.pi / 2])
-        costs.append(best_time(lambda: gait_map(wpi_srs(), "complex", points), 2))  # noqa: B023
+        costs.append(best_time(lambda: map_at(wpi_srs(), "complex", points), 2))  # noqa: B023
     return {"a map": ([float(s) for s in sizes], costs)}
 
 

@@ -29,7 +29,8 @@ from srs_opt.manoeuvre.shooting import shoot
 from srs_opt.manoeuvre.starts import vented
 from srs_opt.manoeuvre.task import REST_CURVATURE_1_M, REST_SPEED_M_S, End, Start, Task
 from srs_opt.manoeuvre.valves import ValvePlan
-from srs_opt.orbit.steady import integrator, steady_gait
+from srs_opt.orbit.body import integrator
+from srs_opt.orbit.steady import steady_gait
 from srs_opt.robot import wpi_srs
 
 NAME = "manoeuvre"

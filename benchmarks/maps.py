@@ -10,7 +10,7 @@ import numpy as np
 from benchmarks.rivals import c_loop
 from benchmarks.section import Section, best_time
 from srs_opt.gait import Gait, Wave
-from srs_opt.gait_map.grid import gait_map, grid_points
+from srs_opt.gait_map.grid import grid_points, map_at
 from srs_opt.orbit.sensitivity import sensitivity
 from srs_opt.orbit.steady import Orbit, steady_gait, steady_gaits
 from srs_opt.robot import wpi_srs
@@ -59,7 +59,7 @@ def _large(one_cycle: float) -> list[list[str]]:
     )
     rows = []
     for name, points in (("map of 21 x 21 x 5", full), ("batch of 1,000", full[:1000])):
-        seconds = best_time(lambda: gait_map(robot, "complex", points, jobs=jobs), 2, processor=False)  # noqa: B023
+        seconds = best_time(lambda: map_at(robot, "complex", points, jobs=jobs), 2, processor=False)  # noqa: B023
         text = f"{seconds:.1f} s on {jobs} cores (wall)"
         rows.append([f"{name}: {len(points)} gaits", text, f"{seconds / len(points) / one_cycle:.1f} each"])
     return rows

@@ -33,7 +33,7 @@ if not solved:
     grid.map_points = lambda robot, model, points: [(*p, *[0.1] * 5) for p in points]
 points = grid.grid_points(list(np.linspace(1, 2, count)), [50.0], [0.4], [1.5])
 with tempfile.TemporaryDirectory() as folder:
-    found = grid.gait_map(wpi_srs(), "complex", points, resume=Path(folder) / "kept")
+    found = grid.map_at(wpi_srs(), "complex", points, resume=Path(folder) / "kept")
     grid.save_map(found, Path(folder) / "map.csv")
 print(own_peak_kb())
 """

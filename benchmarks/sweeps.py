@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from benchmarks.section import Section
-from srs_opt.gait_map.grid import GaitMap, gait_map, grid_points
+from srs_opt.gait_map.grid import GaitMap, grid_points, map_at
 from srs_opt.robot import wpi_srs
 
 
@@ -21,9 +21,9 @@ def run(quick: bool) -> Section:
     with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
         address = str(cluster.scheduler_address)
         ways: dict[str, Callable[[], GaitMap]] = {
-            "one process": lambda: gait_map(robot, "complex", points),
-            "two processes": lambda: gait_map(robot, "complex", points, jobs=2),
-            "two Dask workers": lambda: gait_map(robot, "complex", points, cluster=address),
+            "one process": lambda: map_at(robot, "complex", points),
+            "two processes": lambda: map_at(robot, "complex", points, jobs=2),
+            "two Dask workers": lambda: map_at(robot, "complex", points, cluster=address),
         }
         times, same = {}, {}
         for name, way in ways.items():

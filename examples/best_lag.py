@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from srs_opt.figures import COLOURS, new_figure, save_figure, styled
-from srs_opt.gait_map.grid import gait_map, grid_points
+from srs_opt.gait_map.grid import grid_points, map_at
 from srs_opt.robot import wpi_srs
 
 LAGS_RAD = np.linspace(0.5, 2.0, 31)
@@ -32,7 +32,7 @@ def main(out: Path = Path("out/examples")) -> float:
     speeds = {}
     for law in ("per_axis", "cone"):
         robot = wpi_srs().with_values(friction_law=law)
-        gaits = gait_map(robot, "complex", grid_points([2.0], [41.0], [0.0], list(LAGS_RAD)))
+        gaits = map_at(robot, "complex", grid_points([2.0], [41.0], [0.0], list(LAGS_RAD)))
         speeds[law] = gaits.column("speed_m_s")
     draw(speeds, out / "best_lag")
     best = int(np.nanargmax(speeds["per_axis"]))

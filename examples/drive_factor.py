@@ -10,7 +10,7 @@ import numpy as np
 
 from srs_opt.drive.calibration import fit_calibration
 from srs_opt.figures import COLOURS, PAGE_IN, line_key, new_figure, save_figure, styled
-from srs_opt.gait_map.grid import gait_map, grid_points
+from srs_opt.gait_map.grid import grid_points, map_at
 from srs_opt.robot import wpi_srs
 from virtual_lab.maps import steady_motion
 from virtual_lab.trials import Trial
@@ -45,7 +45,7 @@ def draw(simulated: np.ndarray, measured: np.ndarray, factors: tuple[float, floa
 def main(out: Path = Path("out/examples")) -> float:
     """Return the factor between measured and simulated radius."""
     points = grid_points(FREQUENCIES_HZ, PRESSURES_KPA, [0.4], [np.pi / 2])
-    gaits = gait_map(wpi_srs(), "complex", points)
+    gaits = map_at(wpi_srs(), "complex", points)
     runs = [steady_motion(TRUTH, Trial("run", f, p, 0.4)) for f, p, _, _ in points]
     measured = np.array([[r.speed_m_s for r in runs], [r.radius_m or np.nan for r in runs]])
     simulated = np.stack([gaits.column("speed_m_s"), gaits.column("radius_m")])

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from srs_opt.figures import COLOURS, PAGE_IN, SEQUENTIAL, new_figure, save_figure, styled
-from srs_opt.gait_map.grid import gait_map, grid_points
+from srs_opt.gait_map.grid import grid_points, map_at
 from srs_opt.measurement.dataset import load_dataset
 from srs_opt.robot import wpi_srs
 from virtual_lab.dataset import Recording, write_dataset
@@ -64,7 +64,7 @@ def draw(speed: dict[str, np.ndarray], error: np.ndarray, stem: Path) -> None:
 def main(out: Path = Path("out/examples")) -> float:
     """Return the published gait's speed (m/s) at 2 Hz and 55 kPa in the complex model."""
     speed = {
-        f"{model} model": gait_map(wpi_srs(), model, POINTS).column("speed_m_s").reshape(SHAPE)
+        f"{model} model": map_at(wpi_srs(), model, POINTS).column("speed_m_s").reshape(SHAPE)
         for model in ("complex", "simplified")
     }
     speed[MEASURED], error = measured(out / "fig8_generated")

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from srs_opt.figures import COLOURS, PAGE_IN, line_key, new_figure, save_figure, styled
-from srs_opt.gait_map.grid import gait_map, grid_points
+from srs_opt.gait_map.grid import grid_points, map_at
 from srs_opt.measurement.dataset import load_dataset
 from srs_opt.robot import Robot, wpi_srs
 from virtual_lab.dataset import Recording, write_dataset
@@ -25,7 +25,7 @@ STYLES = {"simplified": "--", "no gap, times (l + L$_o$)/l": ":", "generated run
 
 def modelled(robot: Robot, model: str) -> np.ndarray:
     """Return speed and radius of one model over the grid."""
-    gaits = gait_map(robot, model, POINTS)
+    gaits = map_at(robot, model, POINTS)
     return np.stack([gaits.column("speed_m_s"), gaits.column("radius_m")]).reshape(SHAPE)
 
 

@@ -16,7 +16,7 @@ from planners.drive.contact import BodyWatch
 from planners.motion.robots import undelayed, with_friction_times
 from planners.search.problem import Problem
 from srs_opt.errors import NoAnswerError
-from srs_opt.orbit.steady import integrator
+from srs_opt.orbit.body import integrator
 from srs_opt.robot import Robot
 from srs_opt.simulate.integrate import Integrator, Trajectory
 from srs_opt.simulate.timeline import Timeline

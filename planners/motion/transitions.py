@@ -20,7 +20,8 @@ from planners.motion.valves import DEFAULT_LIMITS, Joints, ValveLimits
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait_opt.table import GaitTable, TableGait
 from srs_opt.orbit.actuators import periodic_actuators
-from srs_opt.orbit.steady import integrator, steady_gait
+from srs_opt.orbit.body import integrator
+from srs_opt.orbit.steady import steady_gait
 from srs_opt.robot import Robot
 from srs_opt.simulate.integrate import Integrator
 from srs_opt.simulate.rosenbrock import VELOCITY

@@ -98,13 +98,14 @@ def _files(
     out: Path, problem: Problem, plan: Plan, driven: PilotedDrive, record: dict[str, object]
 ) -> tuple[Path, ...]:
     from planners.pilot.record import write_dataset
-    from planners.view.picture import save_plan_picture
+    from planners.view.picture import plan_figure
     from planners.view.record import save_motion
+    from srs_opt.figures import save_figure
     from srs_opt.files import write_json
 
     execution = driven.execution
     return (
-        *save_plan_picture(out / "plan", problem, plan, execution.pose[:, :2]),
+        *save_figure(plan_figure(problem, plan, execution.pose[:, :2]), out / "plan"),
         save_motion(out / "motion.json", problem, plan, execution),
         write_dataset(driven.log, out / "dataset", problem.robot, driven.latency.value_s),
         write_json(out / "pilot.json", record),

@@ -27,7 +27,7 @@ from planners.search.problem import Problem
 from srs_opt.controller.program import Program, events_of
 from srs_opt.errors import NoAnswerError
 from srs_opt.measurement.chain import chain_of
-from srs_opt.orbit.steady import integrator
+from srs_opt.orbit.body import integrator
 from srs_opt.simulate.integrate import Integrator, Trajectory
 from srs_opt.simulate.shapes import centre_lines
 from srs_opt.simulate.timeline import Timeline

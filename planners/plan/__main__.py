@@ -10,12 +10,9 @@ from srs_opt.command import Answer, Parser, finite_float, make_parser, positive_
 
 if TYPE_CHECKING:
     from planners.drive.execute import Execution
-    from planners.plan.answer import PlanResult
-    from planners.search.problem import Problem
-    from srs_opt.robot import Robot
+    from planners.plan.route import Route
 
 COSTS = ("time", "length", "clearance", "air")
-MARGIN_M = 0.005
 
 
 def build_parser() -> Parser:
@@ -74,7 +71,7 @@ def add_planning_options(parser: Parser) -> None:
 
 def add_problem_options(parser: Parser) -> None:
     """Add everything but the maze that decides what has to be planned."""
-    from planners.plan.options import goal_option, pose_option
+    from planners.plan.options import MARGIN_M, goal_option, pose_option
 
     parser.add_argument(
         "--gaits", type=Path, metavar="FILE", help="gait table (default: the one built for this robot)"
@@ -140,11 +137,12 @@ def run(options: argparse.Namespace) -> Answer:
 
     from planners.drive.engine_plant import drive_in_engine
     from planners.plan.inputs import problem_from
-    from planners.plan.looks import looks
     from planners.plan.portfolio import Wish, solve
     from planners.plan.registry import planner_named
-    from planners.refine.refine import check_refinable, refine
+    from planners.plan.route import Route, drive_plan
+    from planners.refine.refine import check_refinable
     from planners.view.animation_path import check_animation_path
+    from srs_opt.figures import save_figure
     from srs_opt.files import write_json
     from srs_opt.judge.bodies import check_judge
     from srs_opt.robot import load_robot
@@ -160,121 +158,60 @@ def run(options: argparse.Namespace) -> Answer:
     if options.refine:
         check_refinable(problem)
     wish = Wish(options.planner, options.seed, options.time_limit, options.best)
-    result = solve(problem, wish, lambda message: say(options, message))
-    record = result.to_record(problem)
-    files: list[Path] = []
-    execution = None
-    if result.plan is None:
-        files += _explain(options, problem, result, record)
-    else:
-        plan = result.plan
-        if options.refine:
-            refined = refine(problem, plan, lambda message: say(options, message))
-            problem, plan = refined.problem, refined.plan
-            result = replace(result, plan=plan)
-            record = result.to_record(problem) | {"refined": refined.to_record()}
-        between = looks(problem, plan)
-        record["looks"] = between.to_record()
-        execution = _drive(options, problem, result, record, true_robot)
+    route = Route(problem, solve(problem, wish, lambda message: say(options, message)))
+    if options.refine and route.solved:
+        route = route.refined(lambda message: say(options, message))
+    words = [route.in_words()]
+    record = route.to_dict()
+    good, execution = route.solved, None
+    if route.solved:
+        words.append(route.looks.in_words())
+        if options.execute or true_robot:
+            driven = drive_plan(route, true_robot, lambda message: say(options, message))
+            execution, record["execution"] = driven.execution, driven.to_dict()
+            words.append(driven.in_words())
+            good = good and execution.reached
         if options.judge:
             say(options, "driving in the other engine")
-            told = partial(say, options)
-            record["judge"] = drive_in_engine(problem, plan, true_robot, told).to_record()
-        files += _pictures(options, problem, result, execution)
+            judged = drive_in_engine(route.problem, route.plan, true_robot, partial(say, options)).to_record()
+            record["judge"] = judged
+            words.append(_judge_words(judged))
+            good = good and judged["agrees"]
+        files = _pictures(options, route, execution)
+    else:
+        files = [*save_figure(route.figure(), options.out / "why_not")]
     files.append(write_json(options.out / "plan.json", record))
-    good = result.plan is not None and (execution is None or execution.reached)
-    good = good and record.get("judge", {}).get("agrees", True)
-    words = _summary(record, None if result.plan is None else between.in_words())
-    return Answer(record, words, good, tuple(files))
+    return Answer(record, "\n".join(words), good, tuple(files))
 
 
-def _explain(
-    options: argparse.Namespace, problem: Problem, result: PlanResult, record: dict[str, Any]
-) -> list[Path]:
-    """Say why there is no way, in the record and as a picture."""
-    from planners.plan.explain import explain
-    from planners.view.obstruction import save_obstruction_picture
-
-    explanation = explain(problem)
-    record["reason"] = explanation.in_words(result.reason)
-    record["tightest"] = explanation.to_record()
-    return [*save_obstruction_picture(options.out / "why_not", problem, explanation)]
-
-
-def _drive(
-    options: argparse.Namespace,
-    problem: Problem,
-    result: PlanResult,
-    record: dict[str, Any],
-    true_robot: Robot | None,
-) -> Execution | None:
-    """Drive the plan if asked to, and record how it went."""
-    from planners.drive.execute import execute
-
-    if not (options.execute or true_robot) or result.plan is None:
-        return None
-    execution = execute(problem, result.plan, true_robot, lambda message: say(options, message))
-    record["execution"] = execution.to_record()
-    return execution
-
-
-def _pictures(
-    options: argparse.Namespace, problem: Problem, result: PlanResult, execution: Execution | None
-) -> list[Path]:
+def _pictures(options: argparse.Namespace, route: Route, execution: Execution | None) -> list[Path]:
     from planners.plan.program import plan_program
     from planners.plan.ros_path import save_ros_path
     from planners.view.animate import save_animation
-    from planners.view.picture import save_plan_picture
+    from planners.view.picture import plan_figure
     from planners.view.record import save_motion
     from srs_opt.controller.c_source import write_program
+    from srs_opt.figures import save_figure
 
-    assert result.plan is not None  # the caller has looked
+    problem, plan = route.problem, route.plan
     driven = None if execution is None else execution.pose[:, :2]
-    files = [*save_plan_picture(options.out / "plan", problem, result.plan, driven)]
-    files.append(save_motion(options.out / "motion.json", problem, result.plan, execution))
+    files = [*save_figure(plan_figure(problem, plan, driven), options.out / "plan")]
+    files.append(save_motion(options.out / "motion.json", problem, plan, execution))
     if options.ros_path:
-        files.append(save_ros_path(result.plan, options.ros_path))
-    files.append(write_program(plan_program(problem, result.plan), options.out / "plan_program.h"))
+        files.append(save_ros_path(plan, options.ros_path))
+    files.append(write_program(plan_program(problem, plan), options.out / "plan_program.h"))
     if options.animate:
-        files.append(save_animation(options.animate, problem, result.plan, execution))
+        files.append(save_animation(options.animate, problem, plan, execution))
     return files
 
 
-def _summary(record: dict[str, Any], between: str | None) -> str:
-    """Return the answer in words."""
-    if record["status"] != "solved":
-        return f"{record['status']}: {record['reason']} ({record['planning_s']:.2f} s)"
-    lines = [
-        f"solved by {record['planner']} in {record['planning_s']:.2f} s{_refinement(record)}: "
-        f"{record['length_m']:.2f} m, "
-        f"{record['duration_s']:.1f} s, {sum(s['cycles'] for s in record['steps'])} cycles, clearance "
-        f"at least {1e3 * record['clearance_m']:.1f} mm, certified"
-    ]
-    if between is not None:
-        lines.append(between)
-    if execution := record.get("execution"):
-        lines.append(
-            f"driven: {execution['reason']}; {execution['duration_s']:.1f} s, "
-            f"smallest clearance {1e3 * execution['smallest_clearance_m']:.1f} mm, "
-            f"{execution['replans']} new plans on the way"
-        )
-    if judge := record.get("judge"):
-        lines.append(
-            f"judge: {'agrees' if judge['agrees'] else 'DISAGREES'}: in the other engine {judge['reason']}; "
-            f"{judge['duration_s']:.1f} s, {judge['contacts']} contacts, smallest clearance "
-            f"{1e3 * judge['smallest_clearance_m']:.1f} mm, {judge['replans']} new plans on the way"
-        )
-    return "\n".join(lines)
-
-
-def _refinement(record: dict[str, Any]) -> str:
-    """Return what was made of the plan, in words."""
-    refined = record.get("refined")
-    if refined is None:
-        return ""
-    if refined["kept"]:
-        return f" (kept as found: {refined['kept']})"
-    return f" (refined from {refined['from_s']:.1f} s of way in {refined['seconds']:.0f} s)"
+def _judge_words(judge: dict[str, Any]) -> str:
+    """Return the other engine's drive in words."""
+    return (
+        f"judge: {'agrees' if judge['agrees'] else 'DISAGREES'}: in the other engine {judge['reason']}; "
+        f"{judge['duration_s']:.1f} s, {judge['contacts']} contacts, smallest clearance "
+        f"{1e3 * judge['smallest_clearance_m']:.1f} mm, {judge['replans']} new plans on the way"
+    )
 
 
 def main(argv: list[str] | None = None) -> int:

@@ -1,8 +1,10 @@
-"""Robot, gaits and maze from the command's options."""
+"""The planning problem from robot, gaits and maze, or from the command's options."""
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
+from pathlib import Path
 
 from planners.maze.load import load_maze
 from planners.maze.maze import Maze
@@ -10,45 +12,100 @@ from planners.maze.placement import check_placement
 from planners.maze.places import RobotSize
 from planners.motion.bending import Bending
 from planners.motion.store import load_motion
-from planners.motion.valves import ValveLimits, playable
+from planners.motion.transitions import Progress
+from planners.motion.valves import DEFAULT_LIMITS, ValveLimits, playable
+from planners.plan.options import MARGIN_M
+from planners.search.price import Price
 from planners.search.problem import Problem
 from srs_opt.command import chosen_model, progress, say
-from srs_opt.drive.calibration import NO_CALIBRATION, load_calibration
+from srs_opt.drive.calibration import NO_CALIBRATION, DriveCalibration, load_calibration
 from srs_opt.errors import InputError
 from srs_opt.gait_opt.table import GaitTable, load_table
 from srs_opt.model.parameters import room_effects
 from srs_opt.robot import Robot, load_robot
 
+Tell = Callable[[str], None]
 
-def problem_from(options: argparse.Namespace) -> Problem:
-    """Return the planning problem; bad input is an InputError.
 
-    The maze is looked at first, so that a bad one is refused before anything slow.
+def planning_problem(
+    robot: Robot,
+    maze: Maze,
+    table: GaitTable,
+    *,
+    margin_m: float = MARGIN_M,
+    valves: ValveLimits = DEFAULT_LIMITS,
+    drive: DriveCalibration | None = None,
+    cost: Price = "time",
+    tell: Tell = lambda message: None,
+    show: Progress = iter,
+) -> Problem:
+    """Return the planning problem.
+
+    Parameters
+    ----------
+    robot : Robot
+    maze : Maze
+        With start and goal.
+    table : GaitTable
+        Gaits that `valves` cannot play are left out.
+    margin_m : float
+        Clearance that the body keeps from walls.
+    valves : ValveLimits
+    drive : DriveCalibration, optional
+        Its factors bend every cycle, its uncertainty is room that every cycle keeps.
+    cost : {"time", "length", "clearance", "air"}
+    tell, show : callable
+        Get messages; wraps a long loop with progress.
+
+    Raises
+    ------
+    InputError
+        If the straight robot does not fit at the start, or the margin is out of range.
     """
     import scipy.ndimage
     import scipy.sparse.csgraph  # noqa: F401  (imported here so that planning time is planning time)
 
+    check_margin(robot, margin_m)
+    check_placement(maze, RobotSize(robot.length_m, robot.body_width_m / 2, margin_m))
+    gaits = playable(robot, table, valves)
+    if len(gaits.gaits) < len(table.gaits):
+        tell(f"note: {len(gaits.gaits)} of {len(table.gaits)} gaits keep the valves' limits")
+    motion = load_motion(robot, gaits, valves, show)
+    if drive is not None:
+        motion = motion.bent(Bending(drive, motion.course))
+        tell(
+            f"note: cycles as measured: speed times {drive.speed.value:.3f}, radius times "
+            f"{drive.radius.value:.3f}, uncertain by {1e3 * drive.margin_m(1.0):.1f} mm per metre"
+        )
+    return Problem(robot, gaits, motion, maze, margin_m, cost, drive or NO_CALIBRATION)
+
+
+def check_margin(robot: Robot, margin_m: float) -> None:
+    """Check the clearance that the body shall keep."""
+    if not 0 <= margin_m < robot.length_m:
+        raise InputError(f"--margin: expected 0 to {robot.length_m:.3g} m, found {margin_m:g}")
+
+
+def problem_from(options: argparse.Namespace) -> Problem:
+    """Return the planning problem of the command; bad input is an InputError.
+
+    The maze is looked at first, so that a bad one is refused before anything slow.
+    """
     robot = load_robot(options.robot)
-    if not 0 <= options.margin < robot.length_m:
-        raise InputError(f"--margin: expected 0 to {robot.length_m:.3g} m, found {options.margin:g}")
+    check_margin(robot, options.margin)
     maze = maze_from(options, robot)
     limits = ValveLimits(options.min_dwell, options.tick, options.pressure_rate)
-    table = gaits_from(options, robot)
-    gaits = playable(robot, table, limits)
-    if len(gaits.gaits) < len(table.gaits):
-        say(options, f"note: {len(gaits.gaits)} of {len(table.gaits)} gaits keep the valves' limits")
-    motion = load_motion(
-        robot, gaits, limits, lambda rows: progress(rows, options, "changes of gait (once per gait table)")
+    return planning_problem(
+        robot,
+        maze,
+        gaits_from(options, robot),
+        margin_m=options.margin,
+        valves=limits,
+        drive=None if options.drive is None else load_calibration(options.drive),
+        cost=options.cost,
+        tell=lambda text: say(options, text),
+        show=lambda rows: progress(rows, options, "changes of gait (once per gait table)"),
     )
-    drive = NO_CALIBRATION if options.drive is None else load_calibration(options.drive)
-    if options.drive is not None:
-        motion = motion.bent(Bending(drive, motion.course))
-        say(
-            options,
-            f"note: cycles as measured: speed times {drive.speed.value:.3f}, radius times "
-            f"{drive.radius.value:.3f}, uncertain by {1e3 * drive.margin_m(1.0):.1f} mm per metre",
-        )
-    return Problem(robot, gaits, motion, maze, options.margin, options.cost, drive)
 
 
 def maze_from(options: argparse.Namespace, robot: Robot) -> Maze:
@@ -71,10 +128,17 @@ def maze_from(options: argparse.Namespace, robot: Robot) -> Maze:
 
 def gaits_from(options: argparse.Namespace, robot: Robot) -> GaitTable:
     """Return the gait table: that of --gaits, else the one built for this robot (built now if need be)."""
-    if options.gaits:
-        return load_table(options.gaits, robot)
+    return gaits_for(robot, options.gaits, chosen_model(options, robot), lambda text: say(options, text))
+
+
+def gaits_for(
+    robot: Robot, file: Path | None = None, model: str | None = None, tell: Tell = lambda message: None
+) -> GaitTable:
+    """Return the gait table in `file`, else the one built for `robot` (built now if need be, minutes)."""
+    if file:
+        return load_table(file, robot)
     from srs_opt.gait_opt.catalogue import default_table
 
     if unsteady := room_effects(robot):
-        say(options, f"note: planned without {', '.join(unsteady)}: what depends on the room has no gait")
-    return default_table(robot, chosen_model(options, robot), say=lambda text: say(options, text))
+        tell(f"note: planned without {', '.join(unsteady)}: what depends on the room has no gait")
+    return default_table(robot, model or robot.own_model, say=tell)

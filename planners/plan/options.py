@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from planners.maze.places import Goal, Pose
 
+MARGIN_M = 0.005  # clearance of the body from walls, where none is asked for
+
 
 def pose_option(text: str) -> Pose:
     """Parse X,Y,HEADING."""

@@ -24,7 +24,7 @@ from planners.search.price import Price, Tariff
 from srs_opt.drive.calibration import NO_CALIBRATION, DriveCalibration
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait_opt.table import GaitTable
-from srs_opt.orbit.steady import integrator
+from srs_opt.orbit.body import integrator
 from srs_opt.robot import Robot
 from srs_opt.simulate.integrate import Integrator, Trajectory
 from srs_opt.simulate.shapes import centre_lines

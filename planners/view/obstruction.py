@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 from planners.maze.draw import draw_maze
 from planners.plan.explain import Explanation
 from planners.search.problem import Problem
-from srs_opt.figures import PAGE_IN, RIGHT, new_figure, save_figure, styled
+from srs_opt.figures import PAGE_IN, RIGHT, new_figure, styled
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 MARK = RIGHT
 
 
 @styled
-def save_obstruction_picture(stem: Path, problem: Problem, explanation: Explanation) -> tuple[Path, Path]:
-    """Write the picture (PNG, SVG): maze, widest route, a ring about its tightest place, a close-up."""
+def obstruction_figure(problem: Problem, explanation: Explanation) -> Figure:
+    """Return the picture: maze, widest route, a ring about its tightest place, a close-up."""
     from matplotlib.patches import Circle
 
     figure, (whole, close) = new_figure(1, 2, width_in=PAGE_IN, height_in=2.8, width_ratios=(2, 1))
@@ -41,4 +44,4 @@ def save_obstruction_picture(stem: Path, problem: Problem, explanation: Explanat
         whole.set_title(f"tightest place: {1e3 * place.width_m:.0f} mm")
         name, width = explanation.needs[0]
         close.set_title(f"dashed: {name}\nneeds {1e3 * width:.0f} mm")
-    return save_figure(figure, stem)
+    return figure

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from itertools import groupby
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,10 +14,11 @@ from planners.maze.draw import draw_maze
 from planners.plan.answer import Plan
 from planners.plan.certify import clearances
 from planners.search.problem import Problem
-from srs_opt.figures import PAGE_IN, RIGHT, SEQUENTIAL, save_figure, styled
+from srs_opt.figures import PAGE_IN, RIGHT, SEQUENTIAL, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 BODY_STEP_S = 0.04  # between the bodies whose union is the swept region
 SHOWN_CLEARANCE_M = 0.1
@@ -26,15 +26,11 @@ PATH, DRIVEN = "#202020", RIGHT
 
 
 @styled
-def save_plan_picture(
-    stem: Path, problem: Problem, plan: Plan, driven: NDArray[Any] | None = None
-) -> tuple[Path, Path]:
-    """Write the picture of a plan (PNG and SVG): maze with swept body above, clearance below.
+def plan_figure(problem: Problem, plan: Plan, driven: NDArray[Any] | None = None) -> Figure:
+    """Return the picture of a plan: maze with swept body above, clearance below.
 
     Parameters
     ----------
-    stem : Path
-        Without ending.
     problem : Problem
     plan : Plan
     driven : array (n, 2), optional
@@ -59,7 +55,7 @@ def save_plan_picture(
         title_fontsize=8,
     )
     draw_clearance(below, problem, plan, colors)
-    return save_figure(figure, stem)
+    return figure
 
 
 def gait_colors(problem: Problem, gaits: Iterable[int]) -> dict[int, Any]:

@@ -20,8 +20,9 @@ from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Wave
 from srs_opt.measurement.records import DataSet, MapRow, Trial
 from srs_opt.model.effects import known_effects
+from srs_opt.orbit.body import integrator
 from srs_opt.orbit.sensitivity import sensitivity
-from srs_opt.orbit.steady import Orbit, integrator, steady_gaits
+from srs_opt.orbit.steady import Orbit, steady_gaits
 from srs_opt.robot import Robot
 
 LEAST_SD = np.array([1e-4, 0.01])  # speed in m/s, path's curvature in 1/m

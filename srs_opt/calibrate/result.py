@@ -90,7 +90,7 @@ class Calibration(Result):
         """Return a bar per value: its distance from the bench value, in deviations of the bench."""
         from srs_opt.calibrate.figures import bench_figure
 
-        return bench_figure(self)
+        return bench_figure(self, OFF_BENCH)
 
 
 def bench_warnings(off_bench: Mapping[str, float]) -> tuple[str, ...]:

@@ -56,7 +56,7 @@ def run(options: argparse.Namespace) -> Answer:
     from srs_opt.errors import InputError
     from srs_opt.figures import save_figure
     from srs_opt.files import write_json
-    from srs_opt.gait_map.grid import gait_map, grid_points, load_map, save_map
+    from srs_opt.gait_map.grid import grid_points, load_map, map_at, save_map
     from srs_opt.robot import load_robot
 
     if options.radius is not None and options.turn_rate is not None:
@@ -70,16 +70,14 @@ def run(options: argparse.Namespace) -> Answer:
         points = grid_points(
             list(np.linspace(1, 2, 5)), (41.0, 48.0, 55.0), list(np.linspace(0, 0.8, 6)), _DEFAULT_LAGS
         )
-        gaits = gait_map(
-            robot, model, points, jobs=options.jobs, cluster=options.cluster, quiet=options.quiet
-        )
+        gaits = map_at(robot, model, points, jobs=options.jobs, cluster=options.cluster, quiet=options.quiet)
         files.append(save_map(gaits, options.out / "map.csv"))
     calibration = NO_CALIBRATION
     if options.measured:
-        calibration = calibrate_drive(robot, model, load_measured_map(options.measured))
+        calibration = calibrate_drive(robot, load_measured_map(options.measured), model)
         files.append(save_calibration(calibration, options.out / "drive.json"))
         say(options, calibration_words(calibration, robot.pitch_m / robot.segment_length_m))
-    drive = drive_from_map(robot, model, gaits, calibration)
+    drive = drive_from_map(robot, gaits, calibration, model)
     turn_rate = options.turn_rate or 0.0
     if options.radius is not None:
         chosen = drive.gait_for_radius(options.speed, options.radius)

@@ -230,7 +230,10 @@ def _slopes(corners: np.ndarray) -> np.ndarray:
 
 
 def drive_from_map(
-    robot: Robot, model: str, gaits: GaitMap, calibration: DriveCalibration = NO_CALIBRATION
+    robot: Robot,
+    gaits: GaitMap,
+    calibration: DriveCalibration = NO_CALIBRATION,
+    model: str | None = None,
 ) -> Drive:
     """Build the drive from a simulated map (a grid over frequency and offsets >= 0, per pressure and lag).
 
@@ -250,7 +253,7 @@ def drive_from_map(
         raise InputError(
             "the map needs at least two frequencies and two offsets (>= 0) at one pressure and lag"
         )
-    return Drive(robot, model, np.array(triangles), np.array(widths), calibration)
+    return Drive(robot, model or robot.own_model, np.array(triangles), np.array(widths), calibration)
 
 
 def _cells(part: GaitMap, calibration: DriveCalibration) -> list[np.ndarray]:

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 import shapely
 import shapely.affinity
 
-from srs_opt.drive.drive import Drive, DriveGait
 from srs_opt.figures import COLOURS, fill_region, new_figure, styled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from srs_opt.drive.drive import Drive, DriveGait
 
 
 @styled

@@ -50,7 +50,7 @@ def load_measured_map(path: Path | str) -> MeasuredMap:
     )
 
 
-def calibrate_drive(robot: Robot, model: str, measured: MeasuredMap) -> DriveCalibration:
+def calibrate_drive(robot: Robot, measured: MeasuredMap, model: str | None = None) -> DriveCalibration:
     """Simulate the measured gaits and fit the drive's factors.
 
     Raises
@@ -59,7 +59,7 @@ def calibrate_drive(robot: Robot, model: str, measured: MeasuredMap) -> DriveCal
         If nothing can be compared.
     """
     points = [(float(f), float(p), float(o), float(g)) for f, p, o, g in measured.rows[:, :4]]
-    simulated = np.array(map_points(robot, model, points))
+    simulated = np.array(map_points(robot, model or robot.own_model, points))
     speed, speed_sd, radius, radius_sd = measured.rows[:, 4:].T
     # tracks give a radius to straight runs too; only gaits that turn in the model say something
     return fit_calibration(simulated[:, 4], simulated[:, 6], speed, speed_sd, radius, radius_sd)

@@ -36,7 +36,7 @@ def run(options: argparse.Namespace) -> Answer:
 
     from srs_opt.figures import save_figure
     from srs_opt.gait_map.figures import map_figures
-    from srs_opt.gait_map.grid import gait_map, grid_points, save_map
+    from srs_opt.gait_map.grid import grid_points, map_at, save_map
     from srs_opt.model.parameters import room_effects
     from srs_opt.robot import load_robot
 
@@ -52,7 +52,7 @@ def run(options: argparse.Namespace) -> Answer:
                          options.offset, lags)  # fmt: skip
     started = time.perf_counter()
     unfinished = options.out / "map.unfinished"  # an interrupted map goes on from here
-    gaits = gait_map(
+    gaits = map_at(
         robot, model, points,
         jobs=options.jobs, cluster=options.cluster, quiet=options.quiet, resume=unfinished,
     )  # fmt: skip

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from srs_opt.figures import PAGE_IN, SEQUENTIAL, new_figure, styled
-from srs_opt.gait_map.grid import GaitMap
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from srs_opt.gait_map.grid import GaitMap
 
 _MOST_PANELS = 5
 
@@ -23,7 +25,7 @@ def map_figures(gaits: GaitMap) -> dict[str, Figure]:
     lags = np.unique(gaits.column("phase_lag_rad"))
     for lag in lags:
         at_lag = gaits.rows[gaits.column("phase_lag_rad") == lag]
-        sheet = GaitMap(at_lag)
+        sheet = replace(gaits, rows=at_lag)
         if min(np.unique(sheet.column(c)).size for c in ("frequency_hz", "pressure_kpa")) < 2:
             continue
         name = "map" if lags.size == 1 else f"map_lag{lag:.2f}"
@@ -44,7 +46,7 @@ def _sheet(gaits: GaitMap, lag: float) -> Figure:
         squeeze=False,
     )
     for column, offset in enumerate(shown):
-        part = GaitMap(gaits.rows[gaits.column("offset") == offset])
+        part = replace(gaits, rows=gaits.rows[gaits.column("offset") == offset])
         _contours(axes[0, column], part, np.abs(part.column("speed_m_s")), "speed (m/s)")
         axes[0, column].set_title(f"offset {offset:g}, lag {lag:.2f} rad")
         if turning:

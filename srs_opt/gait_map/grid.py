@@ -112,6 +112,46 @@ def map_points(robot: Robot, model: str, points: Sequence[Point]) -> list[tuple[
 
 def gait_map(
     robot: Robot,
+    frequencies_hz: Sequence[float],
+    pressures_kpa: Sequence[float],
+    offsets: Sequence[float] = (0.0,),
+    lags_rad: Sequence[float] | None = None,
+    *,
+    model: str | None = None,
+    jobs: int = 1,
+) -> GaitMap:
+    """Return the steady motion of all combinations of the paper's wave.
+
+    Parameters
+    ----------
+    robot : Robot
+    frequencies_hz, pressures_kpa, offsets : sequences of float
+    lags_rad : sequence of float, optional
+        Phase lag of every segment behind the one before it; default: one wave along the body.
+    model : str, optional
+        Default: the robot's own.
+    jobs : int
+        Processes; the map does not depend on them.
+
+    Raises
+    ------
+    InputError
+        For offsets that leave a valve for ever on or off, or waves that are not valid.
+
+    Examples
+    --------
+    >>> import srs_opt as srs
+    >>> speeds = srs.gait_map(srs.wpi_srs(), frequencies_hz=[1, 2], pressures_kpa=[41, 55])
+    >>> speeds.column("speed_m_s").round(2)
+    array([0.14, 0.22, 0.16, 0.23])
+    """
+    lags = [2 * math.pi / robot.segments] if lags_rad is None else lags_rad
+    points = grid_points(frequencies_hz, pressures_kpa, offsets, lags)
+    return map_at(robot, model or robot.own_model, points, jobs=jobs)
+
+
+def map_at(
+    robot: Robot,
     model: str,
     points: Sequence[Point],
     *,

@@ -20,7 +20,8 @@ from srs_opt.gait_opt.goal import (
 from srs_opt.gait_opt.score import broken_constraints, evaluated, robot_scores
 from srs_opt.model.effects import known_effects
 from srs_opt.orbit.attractors import other_orbits
-from srs_opt.orbit.steady import Orbit, body_over_cycle, integrator, steady_gait
+from srs_opt.orbit.body import body_over_cycle, integrator
+from srs_opt.orbit.steady import Orbit, steady_gait
 from srs_opt.robot import Robot
 from srs_opt.simulate.integrate import Integrator
 from srs_opt.simulate.rosenbrock import VELOCITY

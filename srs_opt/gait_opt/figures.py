@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from srs_opt.figures import COLOURS, SEQUENTIAL, new_figure, styled
-from srs_opt.gait_opt.search import Found
-from srs_opt.gait_opt.table import GaitTable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from srs_opt.gait_opt.search import Found
+    from srs_opt.gait_opt.table import GaitTable
 
 _MM = 1e3
 

@@ -85,7 +85,7 @@ def run(options: argparse.Namespace) -> Answer:
     from srs_opt.files import write_json
     from srs_opt.manoeuvre.export import draw_manoeuvre, program_of, record_of
     from srs_opt.manoeuvre.search import find
-    from srs_opt.orbit.steady import integrator
+    from srs_opt.orbit.body import integrator
     from srs_opt.robot import load_robot
     from srs_opt.simulate.export import write_trajectory
     from srs_opt.simulate.valve_file import write_valves

@@ -10,8 +10,9 @@ import numpy as np
 
 from srs_opt.errors import NoAnswerError
 from srs_opt.orbit.actuators import periodic_actuators
+from srs_opt.orbit.body import integrator
 from srs_opt.orbit.solve import Cycle, reached_from
-from srs_opt.orbit.steady import Orbit, integrator, orbit_of
+from srs_opt.orbit.steady import Orbit, orbit_of
 from srs_opt.robot import Robot
 from srs_opt.simulate.together import together
 

@@ -7,13 +7,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from srs_opt.figures import COLOURS, LEFT, PAGE_IN, RIGHT, SEQUENTIAL, draw_body, new_figure, styled
+from srs_opt.orbit.body import body_over_cycle, integrator
 from srs_opt.orbit.motion import centre_of_rotation, rotate
-from srs_opt.orbit.steady import Orbit, body_over_cycle, integrator
 from srs_opt.simulate.rosenbrock import VELOCITY, WORK
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from srs_opt.orbit.steady import Orbit
 
 _STROBES = 5
 _MM = 1e3

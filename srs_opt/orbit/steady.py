@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,7 +13,8 @@ import numpy as np
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait, check_gait
 from srs_opt.orbit.actuators import actuator_multiplier
-from srs_opt.orbit.motion import CycleMotion, cycle_motion, rotate
+from srs_opt.orbit.body import body_over_cycle, integrator
+from srs_opt.orbit.motion import CycleMotion, cycle_motion
 from srs_opt.orbit.solve import PeriodicSolution, search_orbit
 from srs_opt.parallel import executor
 from srs_opt.parallel.sweep import sweep
@@ -21,14 +22,12 @@ from srs_opt.result import Result
 from srs_opt.robot import Robot
 from srs_opt.simulate.integrate import TOLERANCE_M_S, Integrator
 from srs_opt.simulate.rosenbrock import WORK
-from srs_opt.simulate.shapes import centre_lines
 from srs_opt.simulate.together import Search, alone, together
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 CHAINS, CHAIN = 8, 12  # gaits searched side by side, and one after the other
-SAMPLES = 48  # body shapes per cycle for the envelope
 
 
 @dataclass(frozen=True, repr=False)
@@ -127,12 +126,6 @@ class Orbit(Result):
         from srs_opt.orbit.figures import gait_figure
 
         return gait_figure(self)
-
-
-@lru_cache(maxsize=64)
-def integrator(robot: Robot, model: str | None = None) -> Integrator:
-    """Return the integrator of a robot without effects that know the room (they have no steady gait)."""
-    return Integrator(robot, model, room=False)
 
 
 def steady_gait(
@@ -251,22 +244,6 @@ def orbit_of(run: Integrator, gait: Gait, solution: PeriodicSolution) -> Orbit:
         kappa=kappa,
         solution=solution,
     )
-
-
-def body_over_cycle(
-    run: Integrator,
-    time_s: np.ndarray,
-    pose: np.ndarray,
-    kappa: np.ndarray,
-    samples: int = SAMPLES,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return times (samples,), poses (samples, 3) and centre lines x, y (points, samples) in the room."""
-    at = np.linspace(0.0, time_s[-1], samples)
-    poses = np.stack([np.interp(at, time_s, column) for column in pose.T], axis=1)
-    kappas = np.stack([np.interp(at, time_s, column) for column in kappa.T])
-    x, y = centre_lines(run, kappas.T).T
-    room_x, room_y = rotate(poses[:, 2], x, y)
-    return at, poses, room_x + poses[:, 0], room_y + poses[:, 1]
 
 
 def travelling(robot: Robot, gait: Gait, model: str | None = None) -> np.ndarray:

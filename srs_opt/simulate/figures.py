@@ -9,11 +9,12 @@ import numpy as np
 from srs_opt.figures import COLOURS, PAGE_IN, draw_body, new_figure, styled
 from srs_opt.orbit.motion import rotate
 from srs_opt.simulate.integrate import Integrator
-from srs_opt.simulate.run import Simulation
 from srs_opt.simulate.shapes import centre_lines
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from srs_opt.simulate.run import Simulation
 
 
 @styled

@@ -10,7 +10,7 @@ from srs_opt.model.actuator import decay
 from srs_opt.model.parameters import Structure
 from srs_opt.model.registry import build
 from srs_opt.orbit.actuators import periodic_actuators
-from srs_opt.orbit.steady import integrator
+from srs_opt.orbit.body import integrator
 from srs_opt.robot import wpi_srs
 
 

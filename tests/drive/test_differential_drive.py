@@ -12,7 +12,7 @@ from srs_opt.drive.drive import Drive, drive_from_map, with_calibration
 from srs_opt.drive.fit import calibrate_drive, load_measured_map
 from srs_opt.errors import InputError, OutOfReachError
 from srs_opt.gait import Wave
-from srs_opt.gait_map.grid import GaitMap, gait_map, grid_points, save_map
+from srs_opt.gait_map.grid import GaitMap, grid_points, map_at, save_map
 from srs_opt.orbit.steady import steady_gait
 from srs_opt.robot import wpi_srs
 
@@ -20,12 +20,12 @@ from srs_opt.robot import wpi_srs
 @pytest.fixture(scope="module")
 def simulated() -> GaitMap:
     points = grid_points([1.0, 1.5, 2.0], [41.0, 55.0], [0.0, 0.25, 0.5, 0.75], [0.9, math.pi / 2])
-    return gait_map(wpi_srs(), "complex", points, jobs=2)
+    return map_at(wpi_srs(), "complex", points, jobs=2)
 
 
 @pytest.fixture(scope="module")
 def drive(simulated) -> Drive:
-    return drive_from_map(wpi_srs(), "complex", simulated)
+    return drive_from_map(wpi_srs(), simulated)
 
 
 @pytest.mark.parametrize("speed", [0.15, 0.3, -0.3])
@@ -64,7 +64,7 @@ def test_planted_factors_are_recovered(simulated, tmp_path):
     header += "speed_m_s,speed_sd_m_s,radius_m,radius_sd_m,replicates"
     table = np.column_stack([rows[:, :4], speed, 0.01 * speed, radius, 0.01 * radius, np.full(n, 3)])
     np.savetxt(file, table, delimiter=",", header=header, comments="")
-    calibration = calibrate_drive(wpi_srs(), "complex", load_measured_map(file))
+    calibration = calibrate_drive(wpi_srs(), load_measured_map(file))
     assert calibration.speed.value == pytest.approx(0.9, abs=4 * calibration.speed.sd)
     assert calibration.radius.value == pytest.approx(1.3, abs=4 * calibration.radius.sd)
     assert 0.005 < calibration.speed.scatter_sd < 0.04  # planted: 2 % beyond the stated 1 %
@@ -121,4 +121,4 @@ def test_command(simulated, tmp_path, capsys):
 
 def test_map_without_a_grid_is_refused(simulated):
     with pytest.raises(InputError, match="two frequencies"):
-        drive_from_map(wpi_srs(), "complex", GaitMap(simulated.rows[:1]))
+        drive_from_map(wpi_srs(), GaitMap(simulated.rows[:1]))

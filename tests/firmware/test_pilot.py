@@ -25,7 +25,7 @@ from srs_opt.controller.program import Program
 from srs_opt.errors import InputError
 from srs_opt.measurement.chain import chain_of, link_positions
 from srs_opt.measurement.dataset import load_dataset
-from srs_opt.orbit.steady import integrator
+from srs_opt.orbit.body import integrator
 from srs_opt.robot import wpi_srs
 from srs_opt.simulate.timeline import Timeline
 from virtual_lab.controller import Controller

@@ -8,14 +8,14 @@ import pytest
 
 from srs_opt.errors import InputError
 from srs_opt.gait_map.__main__ import main
-from srs_opt.gait_map.grid import COLUMNS, gait_map, grid_points, load_map, save_map
+from srs_opt.gait_map.grid import COLUMNS, grid_points, load_map, map_at, save_map
 from srs_opt.robot import wpi_srs
 
 LAG = math.pi / 2
 
 
 def test_known_values_to_one_percent():
-    gaits = gait_map(
+    gaits = map_at(
         wpi_srs(), "complex", [(1.0, 41.0, 0.0, LAG), (2.0, 55.0, 0.4, LAG), (2.0, 41.0, 0.4, 0.9)]
     )
     assert gaits.column("speed_m_s") == pytest.approx([0.0787, 0.2019, 0.5046], rel=0.01)
@@ -25,20 +25,20 @@ def test_known_values_to_one_percent():
 
 
 def test_speed_is_turn_rate_times_radius():
-    gaits = gait_map(wpi_srs(), "simplified", grid_points([1.2, 1.8], [45.0], [-0.5, 0.3], [1.1]))
+    gaits = map_at(wpi_srs(), "simplified", grid_points([1.2, 1.8], [45.0], [-0.5, 0.3], [1.1]))
     product = gaits.column("turn_rate_rad_s") * gaits.column("radius_m")
     assert product == pytest.approx(gaits.column("speed_m_s"), rel=1e-9)
 
 
 def test_processes_change_nothing():
     points = grid_points(list(np.linspace(1, 2, 6)), [41.0, 55.0], [0.0, 0.2, 0.4, 0.6, 0.8], [LAG])
-    alone = gait_map(wpi_srs(), "complex", points, jobs=1)
-    shared = gait_map(wpi_srs(), "complex", points, jobs=2)
+    alone = map_at(wpi_srs(), "complex", points, jobs=1)
+    shared = map_at(wpi_srs(), "complex", points, jobs=2)
     assert np.array_equal(alone.rows, shared.rows, equal_nan=True)
 
 
 def test_file_round_trip(tmp_path):
-    gaits = gait_map(wpi_srs(), "complex", [(2.0, 48.0, 0.0, LAG), (2.0, 48.0, 0.3, LAG)])
+    gaits = map_at(wpi_srs(), "complex", [(2.0, 48.0, 0.0, LAG), (2.0, 48.0, 0.3, LAG)])
     again = load_map(save_map(gaits, tmp_path / "map.csv"))
     np.testing.assert_allclose(again.rows, gaits.rows, rtol=1e-6)
 

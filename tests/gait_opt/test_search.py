@@ -24,7 +24,8 @@ from srs_opt.gait_opt.reach import refuse_contradictions
 from srs_opt.gait_opt.report import summary, wave_parameters
 from srs_opt.gait_opt.search import Where, search
 from srs_opt.gait_opt.switch_times import collocated_speeds
-from srs_opt.orbit.steady import integrator, steady_gait
+from srs_opt.orbit.body import integrator
+from srs_opt.orbit.steady import steady_gait
 from srs_opt.robot import wpi_srs
 from srs_opt.simulate.integrate import Integrator
 from srs_opt.simulate.timeline import Timeline

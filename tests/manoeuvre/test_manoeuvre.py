@@ -14,7 +14,7 @@ from srs_opt.manoeuvre.space import load_space
 from srs_opt.manoeuvre.starts import playable
 from srs_opt.manoeuvre.task import End, Start, Task
 from srs_opt.manoeuvre.valves import ValvePlan, ValveRow
-from srs_opt.orbit.steady import integrator
+from srs_opt.orbit.body import integrator
 from srs_opt.robot import wpi_srs
 from srs_opt.simulate.__main__ import main as simulate
 

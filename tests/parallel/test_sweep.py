@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from srs_opt.gait_map import grid
-from srs_opt.gait_map.grid import gait_map, grid_points
+from srs_opt.gait_map.grid import grid_points, map_at
 from srs_opt.parallel import executor
 from srs_opt.parallel.sweep import Resume, sweep
 from srs_opt.robot import wpi_srs
@@ -65,7 +65,7 @@ def test_other_work_is_not_mistaken_for_this(tmp_path):
 def test_an_interrupted_map_gives_the_same_bits(tmp_path, monkeypatch):
     points = grid_points(list(np.linspace(1, 2, 10)), [41.0, 50.0], [0.0, 0.3], [1.2])
     monkeypatch.setattr(grid, "_CHUNK", 16)
-    whole = gait_map(wpi_srs(), "complex", points)
+    whole = map_at(wpi_srs(), "complex", points)
     solve, done = grid.map_points, []
 
     def interrupted(robot, model, chunk):
@@ -76,10 +76,10 @@ def test_an_interrupted_map_gives_the_same_bits(tmp_path, monkeypatch):
 
     monkeypatch.setattr(grid, "map_points", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        gait_map(wpi_srs(), "complex", points, resume=tmp_path / "kept")
+        map_at(wpi_srs(), "complex", points, resume=tmp_path / "kept")
     assert len(list((tmp_path / "kept").iterdir())) == 2
     monkeypatch.setattr(grid, "map_points", lambda *a: done.append(0) or solve(*a))
-    resumed = gait_map(wpi_srs(), "complex", points, resume=tmp_path / "kept")
+    resumed = map_at(wpi_srs(), "complex", points, resume=tmp_path / "kept")
     assert done.count(0) == 1
     assert np.array_equal(resumed.rows, whole.rows, equal_nan=True)
 

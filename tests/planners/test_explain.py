@@ -2,7 +2,8 @@ import pytest
 from planner_rooms import corridor, gate, maze_of
 
 from planners.plan.explain import explain, gait_needs, narrower_than_any_gait, tightest_place
-from planners.view.obstruction import save_obstruction_picture
+from planners.view.obstruction import obstruction_figure
+from srs_opt.figures import save_figure
 
 
 @pytest.mark.parametrize("width", [0.03, 0.05, 0.08, 0.15])
@@ -27,7 +28,7 @@ def test_closed_wall_is_said(problem_in, tmp_path):
     assert explanation.tightest is None
     assert "completely" in explanation.in_words(None)
     assert explanation.to_record()["width_m"] is None
-    for picture in save_obstruction_picture(tmp_path / "why", problem, explanation):
+    for picture in save_figure(obstruction_figure(problem, explanation), tmp_path / "why"):
         assert picture.stat().st_size > 1000
 
 
@@ -37,9 +38,8 @@ def test_words_name_place_width_and_needs(problem_in, gaits, tmp_path):
     words = explanation.in_words("no way")
     assert "(1.0" in words or "(0.99" in words
     assert "0.045 m wide" in words and "slim" in words and "No gait at all" in words
-    assert all(
-        picture.exists() for picture in save_obstruction_picture(tmp_path / "why", problem, explanation)
-    )
+    pictures = save_figure(obstruction_figure(problem, explanation), tmp_path / "why")
+    assert all(picture.exists() for picture in pictures)
 
 
 def test_weaker_gait_outside_the_table_is_tried(problem_in):

@@ -7,7 +7,7 @@ from planners.motion.robots import undelayed
 from planners.motion.store import _read, table_key, write_transitions
 from planners.motion.table import body_in_room
 from srs_opt.model.outline import centre_line_function
-from srs_opt.orbit.steady import integrator
+from srs_opt.orbit.body import integrator
 
 
 def drive(robot, motion, order):

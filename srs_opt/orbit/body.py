@@ -1,0 +1,36 @@
+"""The body over a cycle of a steady gait, in the room."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from srs_opt.orbit.motion import rotate
+from srs_opt.robot import Robot
+from srs_opt.simulate.integrate import Integrator
+from srs_opt.simulate.shapes import centre_lines
+
+SAMPLES = 48  # body shapes per cycle for the envelope
+
+
+@lru_cache(maxsize=64)
+def integrator(robot: Robot, model: str | None = None) -> Integrator:
+    """Return the integrator of a robot without effects that know the room (they have no steady gait)."""
+    return Integrator(robot, model, room=False)
+
+
+def body_over_cycle(
+    run: Integrator,
+    time_s: np.ndarray,
+    pose: np.ndarray,
+    kappa: np.ndarray,
+    samples: int = SAMPLES,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return times (samples,), poses (samples, 3) and centre lines x, y (points, samples) in the room."""
+    at = np.linspace(0.0, time_s[-1], samples)
+    poses = np.stack([np.interp(at, time_s, column) for column in pose.T], axis=1)
+    kappas = np.stack([np.interp(at, time_s, column) for column in kappa.T])
+    x, y = centre_lines(run, kappas.T).T
+    room_x, room_y = rotate(poses[:, 2], x, y)
+    return at, poses, room_x + poses[:, 0], room_y + poses[:, 1]
