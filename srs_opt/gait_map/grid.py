@@ -143,7 +143,7 @@ def gait_map(
     >>> import srs_opt as srs
     >>> speeds = srs.gait_map(srs.wpi_srs(), frequencies_hz=[1, 2], pressures_kpa=[41, 55])
     >>> speeds.column("speed_m_s").round(2)
-    array([0.14, 0.22, 0.16, 0.23])
+    array([0.08, 0.22, 0.09, 0.23])
     """
     lags = [2 * math.pi / robot.segments] if lags_rad is None else lags_rad
     points = grid_points(frequencies_hz, pressures_kpa, offsets, lags)
