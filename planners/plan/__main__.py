@@ -132,7 +132,6 @@ def add_problem_options(parser: Parser) -> None:
 
 def run(options: argparse.Namespace) -> Answer:
     """Plan, certify, explain, drive, draw."""
-    from dataclasses import replace
     from functools import partial
 
     from planners.drive.engine_plant import drive_in_engine

@@ -147,5 +147,10 @@ def _seen_in(note: TrialNote) -> str:
     return "phase of the bends, after a run-in before the take" if note.moving else "first motion"
 
 
+def main(argv: list[str] | None = None) -> int:
+    """Run the command; return its exit status."""
+    return run_command(build_parser(), run, argv)
+
+
 if __name__ == "__main__":
-    sys.exit(run_command(build_parser(), run))
+    sys.exit(main())

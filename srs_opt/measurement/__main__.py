@@ -113,5 +113,10 @@ def _print_json(listed: list[object] | list) -> None:  # type: ignore[type-arg]
     print(json.dumps({"problems": [_record(p) for p in listed]}))
 
 
+def main(argv: list[str] | None = None) -> int:
+    """Run the command; return its exit status."""
+    return run_command(build_parser(), run, argv)
+
+
 if __name__ == "__main__":
-    sys.exit(run_command(build_parser(), run))
+    sys.exit(main())
