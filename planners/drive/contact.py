@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planners.motion.table import body_in_room
+from planners.plan.certify import EXACT_BELOW
 from planners.search.clearance import BodyClearance
 from planners.search.problem import Problem
 from planners.search.tree import arrival_index
@@ -33,6 +34,7 @@ class BodyWatch:
         self._goal = problem.goal
         self._body = BodyClearance(problem.maze, problem.field, robot.body_width_m / 2, 0.0)
         self._run = run
+        self._exact_below_m = EXACT_BELOW * robot.length_m
         self._time: list[Array] = []
         self._pose: list[Array] = []
         self._lines: list[Array] = []
@@ -76,7 +78,7 @@ class BodyWatch:
     def _clearances(self, lines: Array) -> Array:
         """Return clearances (n,): exact where walls are near, else a lower bound."""
         room = self._body.estimate(lines) - self._body.field.error_m
-        close = room < 0.03
+        close = room < self._exact_below_m
         if close.any():
             room[close] = self._body.exact(lines[close])
         return room

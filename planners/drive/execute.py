@@ -295,7 +295,13 @@ class Drive:
         c, s = math.cos(begin[2]), math.sin(begin[2])
         dx, dy, turn = self.state[:3] - begin
         observed = np.array([c * dx + s * dy, c * dy - s * dx, turn])
-        self.learned = self.learned.update(self.predicted, observed, period_s, self.problem.motion.row(index))
+        self.learned = self.learned.update(
+            self.predicted,
+            observed,
+            period_s,
+            self.problem.motion.row(index),
+            self.problem.robot.length_m,
+        )
         node = nearest_node(self.reference, self.state[:3], self.node)
         self.idle = 0 if node > self.node else self.idle + 1
         self.node = node

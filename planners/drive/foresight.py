@@ -34,8 +34,8 @@ STIFFNESSES_N_M2 = (0.0025, 0.005, 0.012)
 # begins with this squared miss. With 0 sound robots are driven as carefully as soft ones
 UNLIKELY = 1.5
 FADING = 0.7  # of what earlier cycles told, per cycle
-# misses of place (m), heading (rad) and speed (m/s) that weigh alike
-SCALES = np.array([0.01, 0.01, 0.05, 0.05])
+# misses of place (body lengths), heading (rad) and speed (body lengths per second) that weigh alike
+SCALES = (0.0424, 0.0424, 0.05, 0.212)
 # a friction is thought possible up to this squared miss, and so many times the least one
 PLAUSIBLE, TIMES = 1.0, 3.0
 ENOUGH_MARGINS = 0.5  # of the margin: what leaves so much room is good enough
@@ -52,6 +52,7 @@ class Foresight:
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
         robot = problem.robot
+        self._scales = np.array(SCALES) * (robot.length_m, robot.length_m, 1.0, robot.length_m)
         self._runs = [
             integrator(undelayed(with_friction_times(robot, *friction)), problem.gaits.model)
             for friction in FRICTIONS
@@ -90,7 +91,7 @@ class Foresight:
             outcome if isinstance(outcome, NoAnswerError) else self._bent(outcome, cycle)
             for outcome in foreseen
         ]
-        self._seen = FADING * self._seen + [_miss(outcome, after) for outcome in bent]
+        self._seen = FADING * self._seen + [_miss(outcome, after, self._scales) for outcome in bent]
         self._now = after.copy()
         self._bends = {
             run: outcome.final[run.layout.kappa.start : run.layout.dkappa.stop]
@@ -155,10 +156,10 @@ def _yielding(robot: Robot) -> list[Robot]:
     return others if sd is not None else [*others, rigid]
 
 
-def _miss(foreseen: Trajectory | NoAnswerError, after: Array) -> float:
+def _miss(foreseen: Trajectory | NoAnswerError, after: Array, scales: Array) -> float:
     """Return how far a cycle ends from where it did, squared; infinity where the model could not go on."""
     if isinstance(foreseen, NoAnswerError):
         return math.inf
     off = foreseen.final[:4] - after[:4]
     off[2] = (off[2] + math.pi) % (2 * math.pi) - math.pi
-    return float(((off / SCALES) ** 2).sum())
+    return float(((off / scales) ** 2).sum())

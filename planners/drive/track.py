@@ -31,7 +31,7 @@ NODES_PER_CYCLE = 6
 BEYOND = 0.508  # past the goal
 SLOWEST = 0.424  # with which the time for that is reckoned
 LEARNING = 0.3
-LEAST_WAY_M = 0.005  # a cycle that should go less far teaches nothing
+LEAST_WAY = 0.0212  # body lengths; a cycle that should go less far teaches nothing
 _THIN = 3  # every third sample of a cycle is looked at
 
 
@@ -75,11 +75,13 @@ class Learned:
         x, y = stretch * local[..., 0], stretch * local[..., 1]
         return np.stack([c * x - s * y, s * x + c * y, local[..., 2] + turned], axis=-1)
 
-    def update(self, predicted: Array, observed: Array, period_s: float, gait: int) -> Learned:
+    def update(
+        self, predicted: Array, observed: Array, period_s: float, gait: int, length_m: float
+    ) -> Learned:
         """Learn from one cycle's predicted (corrected) and observed displacement, (3,) each."""
         far = math.hypot(predicted[0], predicted[1])
         stretch, own = self.stretch, dict(self.own)
-        if far > LEAST_WAY_M:
+        if far > LEAST_WAY * length_m:
             along = min(max(float(observed[:2] @ predicted[:2]) / far**2, 0.2), 1.5)
             stretch = min(max(stretch * (1 + LEARNING * (along - 1)), 0.5), 1.5)
             alone = own.get(gait, 1.0) * along * self.stretch / stretch

@@ -38,11 +38,12 @@ LOOK_S = 0.04  # between two checks of the motion against the walls
 LEAST_LEAD_S = 0.04  # before the cycle's end, to which the line's and the driver's own time are added
 MOST_LEAD = 0.6  # of a cycle: with less of it seen, its end cannot be predicted
 POSE_LOST_S = 0.25  # three times the longest gap of a camera that loses every marker for a few frames
-STRAY_M = 0.08  # from the predicted motion: a robot that was lifted, pushed, or that does not move at all
+# Lengths in body lengths.
+STRAY = 0.339  # from the predicted motion: a robot that was lifted, pushed, or that does not move at all
 REMEMBERED_S = 3.0  # of sightings: longer than any cycle
-REST_S, REST_M = 0.3, 0.002  # places of so long within so much: it stands still
+REST_S, REST = 0.3, 0.00847  # places of so long within so much: it stands still
 LONGEST_COAST_S = 4.0
-CONTACT_M = -0.002  # foreseen clearance at which it is better to vent than to go on
+CONTACT = -0.00847  # foreseen clearance at which it is better to vent than to go on
 
 
 class PilotedPlant:
@@ -228,11 +229,11 @@ class PilotedPlant:
         self.body, self.clearance_m = lines[0], float(clearances(self._problem, lines)[0])
         self._shows(self)
         off_m = float(np.hypot(*(corrected.pose - motion.pose)[-1, :2]))
-        if off_m > STRAY_M:
+        if off_m > STRAY * self.robot.length_m:
             self._stop(f"strayed by {1e3 * off_m:.0f} mm from the predicted motion", may_go_on=True)
         if left.any():
             lines = body_in_room(centre_lines(self.run, motion.kappa[left]), corrected.pose[left])
-            if float(clearances(self._problem, lines).min()) < CONTACT_M:
+            if float(clearances(self._problem, lines).min()) < CONTACT * self.robot.length_m:
                 self._stop("a wall would have been touched within the cycle", may_go_on=True)
 
     def _coast(self, timeline: Timeline, motion: Trajectory | None) -> Trajectory:
@@ -267,7 +268,8 @@ class PilotedPlant:
             self._look()
             status = self._line.status
             last = self._straight(self._clock.now() - REST_S)
-            still = len(last) > 3 and float(np.ptp(last[:, :2], axis=0).max()) < 4 * REST_M
+            most_m = 4 * REST * self.robot.length_m
+            still = len(last) > 3 and float(np.ptp(last[:, :2], axis=0).max()) < most_m
             if (
                 status is not None
                 and status.state == 0

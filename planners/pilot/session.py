@@ -22,7 +22,7 @@ from srs_opt.controller.program import Program
 from srs_opt.errors import InputError, NoAnswerError
 
 LONGEST_DECISION_S = 0.1  # that the first cycle is prepared for; later ones by what was seen
-AT_START_M, AT_START_RAD = 0.03, 0.15  # farther from the maze's start, and nothing is begun
+AT_START, AT_START_RAD = 0.127, 0.15  # body lengths, rad; farther from the maze's start, and nothing is begun
 
 
 @dataclass(frozen=True)
@@ -130,7 +130,7 @@ def _check_start(problem: Problem, state: np.ndarray) -> None:
     start = problem.start
     off_m = float(np.hypot(state[0] - start.x, state[1] - start.y))
     off_rad = abs(float(state[2]) - start.heading)
-    if off_m > AT_START_M or off_rad > AT_START_RAD:
+    if off_m > AT_START * problem.robot.length_m or off_rad > AT_START_RAD:
         raise InputError(
             f"the robot lies at ({state[0]:.3f}, {state[1]:.3f}), heading {state[2]:.2f}; the start is at "
             f"({start.x:.3f}, {start.y:.3f}), {start.heading:.2f}: put it there, or plan from where it lies: "

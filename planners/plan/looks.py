@@ -28,14 +28,16 @@ THINNED = 3  # every third node, 6 ms apart: the deviations change slowly
 
 @dataclass(frozen=True)
 class Tolerance:
-    """Of a look: half widths of what a camera with markers of 0.5 mm noise tells of a chain of five."""
+    """Of a look, half widths."""
 
-    position_m: float = 0.001
-    heading_rad: float = 0.005
-    speed_m_s: float = 0.01
+    position_m: float
+    heading_rad: float
+    speed_m_s: float
 
-
-DEFAULT_TOLERANCE = Tolerance()
+    @staticmethod
+    def usual(length_m: float) -> Tolerance:
+        """Return what a camera tells of five links: 1 mm where the robot has 236, markers of 0.5 mm noise."""
+        return Tolerance(length_m / 236, 0.005, length_m / 23.6)
 
 
 @dataclass(frozen=True)
@@ -66,7 +68,7 @@ class Looks:
     def to_record(self) -> dict[str, Any]:
         """Return the `looks` entry of the command's JSON."""
         return {
-            "tolerance": asdict(self.tolerance),
+            "tolerance": {key: round(value, 9) for key, value in asdict(self.tolerance).items()},
             "closed_loop_m": round(self.closed_loop_m, 6),
             "closed_loop": self.closed_loop_m > 0,
             "open_loop_m": round(self.open_loop_m, 6),
@@ -90,8 +92,9 @@ class Looks:
         return f"{first}; measured every cycle within {within}, {closed}"
 
 
-def looks(problem: Problem, plan: Plan, tolerance: Tolerance = DEFAULT_TOLERANCE) -> Looks:
+def looks(problem: Problem, plan: Plan, tolerance: Tolerance | None = None) -> Looks:
     """Return what holds of a certified plan between looks and without."""
+    tolerance = tolerance or Tolerance.usual(problem.robot.length_m)
     open_m, until_m = _open_loop(problem, plan, tolerance)
     return Looks(tolerance, _closed_loop(problem, plan, tolerance), open_m, until_m)
 

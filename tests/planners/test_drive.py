@@ -87,7 +87,7 @@ def test_learns_stretch_and_drift():
     predicted, period = np.array([0.2, 0.01, 0.0]), 0.5
     for _ in range(40):
         believed = learned.apply(np.linspace([0, 0, 0], predicted, 17)[None], np.array([period]))[0, -1]
-        learned = learned.update(believed, np.array([0.16, 0.008, 0.05]), period, 0)
+        learned = learned.update(believed, np.array([0.16, 0.008, 0.05]), period, 0, 0.236)
     assert learned.stretches(2)[0] == pytest.approx(0.8, abs=0.02)
     assert learned.stretches(2)[1] == learned.stretch  # what one gait does beyond the others stays its own
     assert learned.drift_rad_s == pytest.approx(0.1, abs=0.01)

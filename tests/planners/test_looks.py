@@ -5,7 +5,7 @@ import pytest
 from planner_rooms import corridor
 
 from planners.motion.table import body_in_room
-from planners.plan.looks import DEFAULT_TOLERANCE, Tolerance, looks
+from planners.plan.looks import Tolerance, looks
 from planners.plan.solve import solve_with_lattice
 from planners.search.tree import arrival_index, at_rest
 from srs_opt.simulate.shapes import centre_lines
@@ -40,7 +40,7 @@ def test_every_cycle_keeps_clear_from_wherever_a_look_may_find_it(solved):
     for k, (gait, state) in enumerate(zip(plan.gaits, [root.state, *plan.certificate.states])):
         timeline = problem.joints.timeline(before, gait)
         for _ in range(6):
-            begun = moved(state, rng, DEFAULT_TOLERANCE, speed=k > 0)
+            begun = moved(state, rng, found.tolerance, speed=k > 0)
             least = min(least, room_of(problem, problem.run.run(timeline, begun)))
         before = gait
     assert found.closed_loop_m - 2e-4 < least < found.closed_loop_m + 0.003

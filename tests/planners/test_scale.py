@@ -12,6 +12,7 @@ from planners.maze.maze import Maze
 from planners.maze.places import Goal, Pose
 from planners.maze.walls import Walls
 from planners.motion.transitions import motion_table, simulate_transitions
+from planners.plan.looks import looks
 from planners.plan.solve import solve_with_lattice
 from planners.search.problem import Problem
 from srs_opt.gait_opt.table import GaitTable, TableGait
@@ -42,7 +43,8 @@ def plan(robot, gaits, s):
     walls = Walls.of([(shapely.box(*(s * v for v in box)), 0.0) for box in BOXES])
     goal = Goal(2.0 * s, 0.4 * s, 0.08 * s)
     maze = Maze("z", (0, 0, 2.3 * s, 1.2 * s), walls, start=Pose(0.3 * s, 0.4 * s, 0.0), goal=goal)
-    return solve_with_lattice(Problem(large, table, motion, maze, 0.005 * s)).plan
+    problem = Problem(large, table, motion, maze, 0.005 * s)
+    return problem, solve_with_lattice(problem).plan
 
 
 @pytest.fixture(scope="module")
@@ -52,10 +54,13 @@ def usual(robot, gaits):
 
 @pytest.mark.parametrize("s", [3.0, 1 / 3])
 def test_the_plan_does_not_depend_on_the_size(robot, gaits, usual, s):
-    other = plan(robot, gaits, s)
+    (problem, other), (usual_problem, usual) = plan(robot, gaits, s), usual
     assert other.gaits == usual.gaits
     assert other.duration_s == pytest.approx(usual.duration_s, rel=1e-3)
     assert other.length_m == pytest.approx(s * usual.length_m, rel=1e-3)
     assert other.certificate.clearance_m == pytest.approx(s * usual.certificate.clearance_m, rel=0.02)
     ends = (p.certificate.pose[-1] / (k, k, 1) for p, k in ((usual, 1.0), (other, s)))
     assert np.allclose(*ends, atol=2e-3)
+    looked, usually = looks(problem, other), looks(usual_problem, usual)
+    assert looked.closed_loop_m == pytest.approx(s * usually.closed_loop_m, rel=0.02)
+    assert looked.open_loop_m == pytest.approx(s * usually.open_loop_m, rel=0.02)
