@@ -32,6 +32,7 @@ from srs_opt.gait_opt.companions import leaned_family
 from srs_opt.gait_opt.goal import Goal, Limits
 from srs_opt.gait_opt.search import search
 from srs_opt.robot import Robot
+from virtual_lab import simulate
 from virtual_lab.assemble import assemble
 from virtual_lab.simulate import look, sample
 from virtual_lab.trials import Schedule, Trial
@@ -61,7 +62,11 @@ class Played:
 
 
 def play(truth: Truth, gaits: list[Gait], start: tuple[float, float, float]) -> Played:
-    """Play gaits, a cycle each, on the true robot: at rest, straight, centre of mass at `start`."""
+    """Play gaits, a cycle each, on the true robot: at rest, straight, centre of mass at `start`.
+
+    What segments remember (hysteresis) goes on from cycle to cycle; of effects that delay valves the first
+    moments of every cycle would be wrong.
+    """
     x, y, heading = start
     links = truth.parameters.links
     pitch = truth.parameters.segment_length_m + truth.parameters.gap_length_m
@@ -70,20 +75,21 @@ def play(truth: Truth, gaits: list[Gait], start: tuple[float, float, float]) -> 
     shape = np.zeros((links - 1, 4))
     centres, lines = [], []
     for gait in gaits:
-        entries = tuple((i + 1, on, off) for i, pairs in enumerate(gait.intervals) for on, off in pairs)
-        trial = Trial(
-            "cycle", 1 / gait.period_s, gait.pressure_kpa, schedule=Schedule(entries, gait.period_s)
-        )
         times = np.linspace(0.0, gait.period_s, FRAMES + 1)
-        tables = assemble(truth, trial, gait.period_s + 1e-9)
+        tables = assemble(truth, trial_of(gait), gait.period_s + 1e-9)
         samples = sample(tables, state, shape, times)
         seen = look(tables, samples, times)
         centres.append(seen.centre_of_mass()[1:])
         lines.append(np.stack([_filled(seen.x), _filled(seen.y)], axis=2)[1:])
-        n = links - 1
         state = samples[-1, :6].copy()
-        shape[:, 0], shape[:, 1] = samples[-1, 6 : 6 + n], samples[-1, 6 + n : 6 + 2 * n]
     return Played(np.concatenate(centres), np.concatenate(lines))
+
+
+def trial_of(gait: Gait) -> Trial:
+    """Return a gait as the laboratory plays it."""
+    entries = tuple((i + 1, on, off) for i, pairs in enumerate(gait.intervals) for on, off in pairs)
+    schedule = Schedule(entries, gait.period_s)
+    return Trial("gait", 1 / gait.period_s, gait.pressure_kpa, schedule=schedule)
 
 
 def _filled(nodes: np.ndarray) -> np.ndarray:
@@ -95,8 +101,8 @@ def _filled(nodes: np.ndarray) -> np.ndarray:
 
 def true_speed_m_s(truth: Truth, gait: Gait) -> float:
     """Return the steady speed of a straight gait on the true robot."""
-    centre = play(truth, [gait] * (SETTLED + MEASURED), (0.0, 0.0, 0.0)).centre
-    steps = np.diff(centre[SETTLED * FRAMES - 1 :: FRAMES], axis=0)
+    times = gait.period_s * np.arange(SETTLED, SETTLED + MEASURED + 1)
+    steps = np.diff(simulate.run(truth, trial_of(gait), times).centre_of_mass(), axis=0)
     return float(np.linalg.norm(steps, axis=1).mean() / gait.period_s)
 
 

@@ -343,7 +343,7 @@ def integrate(state, shape, edges, steps, push, sign, bias, bend, lengths, links
     state : (6,) array
         Pose and velocity of the tail at the start.
     shape : (N-1, 4) array
-        Curvature, its rate, hysteresis variable; the last column is scratch.
+        Curvature, its rate, hysteresis variable; the last column is scratch. Holds the end's afterwards.
     edges, steps : (K+1,) and (K,) arrays
         Times of the valve switches and number of Runge-Kutta steps between them.
     push, sign : (K, N-1) arrays
@@ -389,4 +389,5 @@ def integrate(state, shape, edges, steps, push, sign, bias, bend, lengths, links
                 taken += 1
             before, after = after, before
             start, end = end, start
+    shape[:] = before
     return samples[:taken]

@@ -25,7 +25,7 @@ class LiveRobot:
 
     def __init__(self, truth: Truth, x_m: float = 0.0, y_m: float = 0.0, heading_rad: float = 0.0) -> None:
         names = {name for name, _ in truth.hidden()}
-        if unknown := names & {"hysteresis", "dead_time", "slow_valve"}:
+        if unknown := names & {"dead_time", "slow_valve"}:
             raise LabError(f"{', '.join(sorted(unknown))}: the live robot keeps no memory of earlier valves")
         if truth.parameters.valve_delay_s > 0:
             raise LabError("valve_delay_s: the live robot keeps no memory of earlier valves")
@@ -48,15 +48,11 @@ class LiveRobot:
         edges = np.array([self.time_s, self.time_s + duration_s])
         steps = np.array([max(math.ceil(duration_s / t.longest_step_s), 1)])
         tables = dataclasses.replace(t, push=push, sign=sign, edges=edges, steps=steps)
-        self._keep(sample(tables, self._state, self._shape, edges[1:])[-1])
+        row = sample(tables, self._state, self._shape, edges[1:])[-1]
+        self._state = row[: self._state.size].copy()
         self.time_s = float(edges[1])
 
     def look(self) -> Run:
         """Return places and headings of all links now."""
         row = np.concatenate([self._state, self._shape[:, 0], self._shape[:, 1]])
         return look(self._tables, row[None, :], np.array([self.time_s]))
-
-    def _keep(self, row: np.ndarray) -> None:
-        size = self._state.size
-        self._state = row[:size].copy()
-        self._shape[:, :2] = row[size:].reshape(2, -1).T

@@ -82,6 +82,8 @@ def run(
 def sample(tables: Tables, state: np.ndarray, shape: np.ndarray, times: np.ndarray) -> np.ndarray:
     """Integrate from a state of tail and segments; return samples at increasing times.
 
+    Afterwards `shape` is that of the segments at the tables' end, what they remember included.
+
     Rows are pose and velocity of the tail, curvatures, their rates; of a body that bends under load, whose
     state holds its bends and their rates as well, then no-load curvatures and their rates.
     """

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from srs_opt.calibrate.objective import sum_eliminated
 from srs_opt.discrepancy.examined import Examined
+from srs_opt.discrepancy.hypothesis import Hypothesis
 
 ODD = 3.0
+CLOSES = 0.5  # share of the misfit that a fit must close to say where the gap is
 STAGES = {
     "actuation": "valves to curvature",
     "body": "geometry of the body",
@@ -38,9 +41,17 @@ class Place:
     p_value: float
 
 
-def locate(examined: Examined, most: int = 8) -> tuple[Place, ...]:
-    """Return where the gap shows most, best first: parts of the motion, then stages by their best effect."""
-    return (*stages(examined), *left_places(examined)[:most])
+def locate(examined: Examined, fitted: Sequence[Hypothesis] = (), most: int = 8) -> tuple[Place, ...]:
+    """Return where the gap is, then where it shows most, best first.
+
+    Parameters
+    ----------
+    examined : Examined
+        Calibration alone.
+    fitted : sequence of Hypothesis
+        What was fitted to close the gap: effects, or terms that describe it.
+    """
+    return (*stages(examined.hypothesis, fitted), *left_places(examined)[:most])
 
 
 def left_places(examined: Examined) -> list[Place]:
@@ -54,21 +65,27 @@ def left_places(examined: Examined) -> list[Place]:
     return sorted(places, key=lambda p: -p.score)
 
 
-def stages(examined: Examined) -> tuple[Place, ...]:
-    """Return the stages of the model, scored by the best effect that each could lack."""
-    from srs_opt.model.effects import known_effects
+def stages(null: Hypothesis, fitted: Sequence[Hypothesis]) -> tuple[Place, ...]:
+    """Return the stages of the model whose effects close most of the gap when they are fitted, best first.
 
-    best: dict[str, tuple[float, int]] = {}
-    temper = examined.linearisation.temper
-    for score in examined.scores:
-        kind = known_effects()[score.candidate.effect].kind
-        gain = score.improvement * temper
-        if gain > best.get(kind, (0.0, 1))[0]:
-            best[kind] = (gain, score.dof)
-    found = [
-        Place(STAGES[kind], "any effect of this stage", gain / dof, 0.0) for kind, (gain, dof) in best.items()
-    ]
-    return tuple(sorted((p for p in found if p.score > 20), key=lambda p: -p.score))
+    What an effect would gain in the screen says little where the gap is large: much that has nothing to do
+    with it soaks some of it up. Effects of several stages together tell of these only as the best set.
+    """
+
+    def closed(h: Hypothesis) -> float:
+        return (null.fit.misfit_ratio - h.fit.misfit_ratio) / max(null.fit.misfit_ratio - 1, 1e-9)
+
+    found: dict[str, Place] = {}
+    ordered = sorted((h for h in fitted if h.candidates and closed(h) >= CLOSES), key=closed, reverse=True)
+    for h in ordered:
+        alone = len({c.form.effect.kind for c in h.candidates}) == 1
+        for c in h.candidates if alone or h is ordered[0] else ():
+            where = STAGES[c.form.effect.kind]
+            if c.place is not None and c.form.effect.place is not None:
+                where += f", {c.form.effect.place.name} {c.place}"
+            gain = (null.deviance - h.deviance) / h.parameters
+            found.setdefault(c.form.effect.kind, Place(where, c.form.effect.what, gain, 0.0))
+    return tuple(found.values())
 
 
 def misfit_by_trial(examined: Examined) -> dict[str, float]:

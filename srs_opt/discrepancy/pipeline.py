@@ -202,7 +202,7 @@ def _examine(
         null,
         best,
         selection,
-        locate(null),
+        locate(null, [*fitted, *([description.best] if description else [])]),
         null.scores,
         gap,
         following,
