@@ -41,6 +41,9 @@ class Settings:
         Terms that are fitted, the best of the screens.
     exchanges : int
         Rounds of looking for a better term from where the best one stands.
+    bench : float
+        Standard deviations that a calibrated value may lie from its bench value; twice what it may with a
+        named effect, because a term is a simple likeness of what is there.
     explained : float
         Share of the misfit that the best may leave and need not be exchanged.
     """
@@ -49,6 +52,7 @@ class Settings:
     lead: float = 0.5
     refits: int = 7
     exchanges: int = 3
+    bench: float = 7.0
     explained: float = 0.02
 
 
@@ -207,7 +211,10 @@ def _doubt(
     own = next(h for h in tried if h.label == found.label)
     if rivals and _left(own) > settings.lead * _left(rivals[0]):
         return f"{rivals[0].label} does about as well"
-    return found.against_the_bench()
+    name, off = max(found.fit.off_bench.items(), key=lambda item: abs(item[1]), default=("", 0.0))
+    if abs(off) > settings.bench:
+        return f"{name} would lie {abs(off):.1f} standard deviations from its bench value"
+    return ""
 
 
 def _says(hypothesis: Hypothesis) -> tuple[str, int | None]:
