@@ -20,14 +20,18 @@ def obstruction_figure(problem: Problem, explanation: Explanation) -> Figure:
     """Return the picture: maze, widest route, a ring about its tightest place, a close-up."""
     from matplotlib.patches import Circle
 
-    figure, (whole, close) = new_figure(1, 2, width_in=PAGE_IN, height_in=2.8, width_ratios=(2, 1))
-    for axes in (whole, close):
-        draw_maze(axes, problem.maze)
     place = explanation.tightest
     if place is None:
+        figure, whole = new_figure(width_in=PAGE_IN, height_in=2.8)
+        draw_maze(whole, problem.maze)
         whole.set_title("start and goal are not connected")
-        close.set_visible(False)
     else:
+        ratio = problem.maze.width_m / problem.maze.height_m
+        figure, (whole, close) = new_figure(
+            1, 2, width_in=PAGE_IN, height_in=2.8, width_ratios=(min(max(ratio, 1.0), 3.0), 1)
+        )
+        for axes in (whole, close):
+            draw_maze(axes, problem.maze)
         reach = max(3 * place.width_m, 0.5 * problem.robot.length_m)
         for axes in (whole, close):
             axes.plot(*place.route.T, color=MARK, linewidth=0.8, zorder=3)
