@@ -13,6 +13,9 @@ from benchmarks.discrepancy import (
     right_name,
     wrong_name,
 )
+from benchmarks.discrepancy_described import KINDS as TRUE_KINDS
+from benchmarks.discrepancy_described import right_description
+from virtual_lab.catalogue import UNLISTED
 
 
 def row(hidden, verdict, named=(), alternatives=()):
@@ -109,3 +112,16 @@ def test_a_study_keeps_its_rows_and_says_when(tmp_path, monkeypatch):
     assert rows == kept == [{"product": 6}, {"product": 20}]
     assert "Python" in measured
     assert [p.name for p in tmp_path.iterdir()] == ["study.jsonl"]
+
+
+def test_a_description_must_tell_the_kind_and_the_place():
+    truth = [{"name": "stiff_wheel", "excess": 5.0, "link": 2}]
+
+    def said(name, **parameters):
+        return right_description(truth, [{"name": f"generic_{name}", "parameters": parameters}])
+
+    assert said("along_link", excess=4.9, link=2) == (True, True)
+    assert said("along_link", excess=4.9, link=3) == (True, False)
+    assert said("across_link", excess=4.9, link=2) == (False, True)
+    assert right_description(truth, []) == (False, False)
+    assert set(TRUE_KINDS) == set(UNLISTED)
