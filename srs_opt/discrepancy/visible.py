@@ -28,15 +28,16 @@ class Visible:
 
     Attributes
     ----------
-    m : float or None
-        Root mean square by which it moves the markers after calibration has made up for what it can.
+    m : float
+        Root mean square by which it moves the markers, as gaps are measured: after calibration and the
+        trials' own friction and curvature have made up for what they can.
     speed_share, radius_share : float or None
-        Changes of speed and radius over themselves.
+        Changes of speed and radius over themselves; None where no trial drives.
     not_seen : tuple of str
         Effects that these data do not show at any plausible size.
     """
 
-    m: float | None
+    m: float
     speed_share: float | None
     radius_share: float | None
     not_seen: tuple[str, ...] = field(default=())
@@ -44,12 +45,10 @@ class Visible:
     @property
     def in_words(self) -> str:
         """What may be said of what was not found."""
-        if self.m is None:
-            return ""
-        said = f"moves the markers by more than {1e3 * self.m:.2g} mm"
+        said = f"moves the markers by more than {1e3 * self.m:.2g} mm beyond what calibration makes up for"
         if self.speed_share is not None:
             said += f", or changes the speed by more than {self.speed_share:.1%}"
-        said = f"any known effect that {said}, would have been seen"
+        said = f"any known effect that {said} would have been seen"
         return f"{said}, except {', '.join(self.not_seen)}" if self.not_seen else said
 
 
@@ -60,10 +59,11 @@ def visible(
     trials: Sequence[Trial],
     settings: Settings = SETTINGS,
 ) -> Visible:
-    """Return the smallest missing effect that the open trials would have shown, as seen on `trials`.
+    """Return the smallest missing effect that the open trials would have shown.
 
-    Every effect is played at the size at which it would have been found, at the place where it shows least,
-    with the calibrated parameters gone where the fit would take them.
+    For speed and radius every effect is played on a few of `trials`, at the size at which it would have been
+    found and the place where it shows least, with the calibrated parameters gone where the fit would take
+    them.
     """
     lin = null.linearisation
     total = sum_eliminated(lin.grams, lin.temper)
@@ -83,8 +83,11 @@ def visible(
         if seen:
             sizes[effect] = max(seen, key=lambda pair: pair[0] / pair[1].sizes[0].typical)
     point = null.hypothesis.fit.point
+    count = sum(g.count for g in lin.grams.values())
+    needed = max(_needed(c, len(null.scores)) for c in candidates) if candidates else 0.0
+    seen_m = max(needed * experiment.sd_m * float(np.sqrt(lin.temper / count)), settings.negligible_m)
     if not played:
-        return Visible(None, None, None, tuple(unseen))
+        return Visible(seen_m, None, None, tuple(unseen))
     before = experiment.residuals(played, Point(point.values))
     tracks = [np.asarray(track_of(t)) for t in played]
     figures = []
@@ -102,19 +105,20 @@ def visible(
             continue
         moved = [b - a for a, b in zip(after, before)]
         as_if = [t - b for t, b in zip(tracks, before)]
-        figures.append((float(np.sqrt(np.nanmean(np.concatenate([m.ravel() for m in moved]) ** 2))),
-                        *motion_errors(played, moved, as_if)))  # fmt: skip
-    return _largest(figures, settings, tuple(unseen))
+        figures.append(motion_errors(played, moved, as_if))
+    speed, radius = (_largest([f[k] for f in figures], settings.negligible_speed) for k in (0, 1))
+    return Visible(seen_m, speed, radius, tuple(unseen))
 
 
-def _largest(
-    figures: Sequence[tuple[float | None, ...]], settings: Settings, unseen: tuple[str, ...]
-) -> Visible:
-    """Return the largest of each figure; no less than what is taken for no gap at all."""
-    floors = settings.negligible_m, settings.negligible_speed, settings.negligible_speed
-    columns = [[f for f in column if f is not None] for column in zip(*figures)] or [[], [], []]
-    largest = [max([*c, floor]) if c else None for c, floor in zip(columns, floors)]
-    return Visible(largest[0], largest[1], largest[2], unseen)
+def _largest(values: Sequence[float | None], floor: float) -> float | None:
+    """Return the largest; no less than what is taken for no gap at all."""
+    known = [v for v in values if v is not None]
+    return max([*known, floor]) if known else None
+
+
+def _needed(candidate: Candidate, family: int) -> float:
+    """Return the deviations from zero at which an effect is found nine times in ten."""
+    return float(np.sqrt(needed_gain(candidate, family))) + SURELY
 
 
 def _least(total: np.ndarray, column: int, inverse: np.ndarray, candidate: Candidate, family: int) -> float:
@@ -124,7 +128,7 @@ def _least(total: np.ndarray, column: int, inverse: np.ndarray, candidate: Candi
     information = float(total[column, column] - cross @ inverse @ cross)
     if information <= 1e-9 * float(total[column, column]):
         return float("inf")
-    return float((np.sqrt(needed_gain(candidate, family)) + SURELY) / np.sqrt(information))
+    return _needed(candidate, family) / float(np.sqrt(information))
 
 
 def _spread(trials: Sequence[Trial]) -> list[Trial]:

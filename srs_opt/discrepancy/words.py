@@ -15,7 +15,7 @@ def in_words(found: Discrepancy) -> list[str]:
             f"sealed trials: {gap.calibrated * 1e3:.3f} mm calibrated, {gap.with_effect * 1e3:.3f} mm with "
             f"the effect, noise floor {gap.noise_floor * 1e3:.3f} mm"
         )
-    if found.would_have_seen is not None and found.would_have_seen.in_words:
+    if found.would_have_seen is not None:
         lines.append(found.would_have_seen.in_words)
     lines += [f"set aside: {name} ({why})" for name, why in found.set_aside]
     following = found.next_experiment
