@@ -111,7 +111,7 @@ def remainder_place(found: Discrepancy) -> str | None:
     if examined is None or examined.adequate:
         return None
     places = left_places(examined)
-    return f"mostly {places[0].where} against {places[0].against}" if places else None
+    return f"mostly in {places[0].where}, varying with {places[0].against}" if places else None
 
 
 def _would_have_seen(found: Discrepancy) -> dict[str, Any] | None:

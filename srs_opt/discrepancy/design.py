@@ -74,7 +74,9 @@ def rivals_of(selection: Selection, fitted: Sequence[Hypothesis], null: Hypothes
         return {known_effects()[c.effect].kind for c in h.candidates}
 
     own = stages(selection.best)
-    others = sorted((h for h in fitted if h.candidates and stages(h) != own), key=lambda h: h.deviance)
+    mine = set(selection.best.names)
+    apart = (h for h in fitted if h.candidates and not mine <= set(h.names))  # more of the same is no other
+    others = sorted((h for h in apart if stages(h) != own), key=lambda h: h.deviance)
     if others:
         return selection.best, others[0]
     return (selection.best, null) if selection.best.candidates else (null,)
