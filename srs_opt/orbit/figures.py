@@ -49,14 +49,17 @@ def _body(axes: Axes, orbit: Orbit) -> None:
     turn_rate = orbit.motion.displacement[2] / orbit.gait.period_s
     heading = (poses[:, 2] - turn_rate * at).mean()
     colours = colormaps[SEQUENTIAL]
+    lowest = 0.0
     for k, i in enumerate(np.linspace(0, at.size - 1, _STROBES).astype(int)):
-        # the mean turn taken out, and one below the other, so that the strobe does not cover itself
-        across, down = x[:, i] - poses[i, 0], y[:, i] - poses[i, 1]
-        body_x, body_y = rotate(-heading - turn_rate * at[i], across, down)
-        body_x, body_y = body_x + orbit.speed_m_s * at[i], body_y - 1.1 * k * sum(orbit.envelope_m)
+        # headed along the path at first, turning as it turns, and one below the other, so that the strobe
+        # does not cover itself
+        body_x, body_y = rotate(-heading, x[:, i] - poses[i, 0], y[:, i] - poses[i, 1])
+        body_x = body_x + orbit.speed_m_s * at[i]
+        body_y = body_y + lowest - body_y.max() - robot.body_width_m
+        lowest = body_y.min() - 0.5 * robot.body_width_m
         draw_body(axes, body_x, body_y, robot.body_width_m, facecolor=colours(k / _STROBES))
         axes.plot(body_x[-1], body_y[-1], "o", color="black", markersize=2)
-        axes.annotate(f"{at[i]:.2f} s", (body_x.min() - robot.body_width_m / 2, body_y[0]), (-3, 0),
+        axes.annotate(f"{at[i]:.2f} s", (body_x.min() - robot.body_width_m / 2, body_y.mean()), (-3, 0),
                       textcoords="offset points", ha="right", va="center", fontsize=6)  # fmt: skip
     axes.spines["left"].set_visible(False)
     axes.set(aspect="equal", xlabel="along the path (m)", yticks=[], title="Body over a cycle (head: dot)")
