@@ -141,4 +141,9 @@ def gaits_for(
 
     if unsteady := room_effects(robot):
         tell(f"note: planned without {', '.join(unsteady)}: what depends on the room has no gait")
+    if not robot.is_soft:
+        tell(
+            f"note: robot '{robot.name}' gives no bending stiffness: rigid actuators assumed; a body that "
+            "bends moves otherwise (measure it, or gait_opt --table --stiffness EI...)"
+        )
     return default_table(robot, model or robot.own_model, say=tell)

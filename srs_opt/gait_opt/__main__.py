@@ -269,12 +269,23 @@ def run(options: argparse.Namespace) -> Answer:
     return Answer(answer, summary(answer), good, tuple(files))
 
 
+def _robots_of_table(options: argparse.Namespace) -> tuple[Robot, ...]:
+    """Return the robots that a table has to serve, the one whose motion it states first."""
+    from srs_opt.gait_opt.robust import in_the_middle
+    from srs_opt.robot import load_robot
+
+    robots = softened(options, [load_robot(path) for path in options.robots or [options.robot]])
+    return in_the_middle(robots) if options.stiffness else tuple(robots)
+
+
 def _run_table(options: argparse.Namespace) -> Answer:
     """Build the gait table and write it as JSON, CSV and C header."""
     from srs_opt.errors import InputError
 
-    if options.stiffness or options.robots or options.worst:
-        raise InputError("--table is built for one robot: without --stiffness, --robots and --worst")
+    if options.worst and not (options.stiffness or options.robots):
+        raise InputError("--worst says which of several robots counts: give --stiffness or --robots with it")
+    if options.warm and (options.stiffness or options.robots):
+        raise InputError("--table --warm moves one robot's table: without --stiffness and --robots")
     import shutil
     import time
     from functools import partial
@@ -282,18 +293,20 @@ def _run_table(options: argparse.Namespace) -> Answer:
     from srs_opt.controller.c_source import write_program
     from srs_opt.controller.program import Program
     from srs_opt.figures import save_figure
-    from srs_opt.gait_opt.catalogue import cached_table_path
+    from srs_opt.gait_opt.catalogue import cached_table_path, default_table
     from srs_opt.gait_opt.entries import certified_table
     from srs_opt.gait_opt.export import write_csv
     from srs_opt.gait_opt.family import TABLE_PRESSURE_KPA, build_table
     from srs_opt.gait_opt.goal import Limits
-    from srs_opt.gait_opt.report import if_soft, soft_speeds
+    from srs_opt.gait_opt.report import if_soft, robust_words, soft_speeds
+    from srs_opt.gait_opt.robust_table import robust_table
     from srs_opt.gait_opt.table import load_table, save_table
     from srs_opt.judge.bodies import check_judge
     from srs_opt.judge.opinion import Case, opinions
-    from srs_opt.robot import load_robot
+    from srs_opt.robot import save_robot
 
-    robot = load_robot(options.robot)
+    robots = _robots_of_table(options)
+    robot = robots[0]
     model = chosen_model(options, robot)
     if options.judge:
         check_judge([robot])
@@ -305,6 +318,11 @@ def _run_table(options: argparse.Namespace) -> Answer:
         if options.warm:
             table = load_table(options.warm, robot)
             table = certified_table(robot, table, limits, partial(say, options), on_other_ticks=True, **where)
+        elif len(robots) > 1:
+            rigid = robot.with_values(bending_stiffness_n_m2=None, gap_stiffness_n_m2=None)
+            basis = default_table(rigid, say=partial(say, options))
+            worst = options.worst or "relative"
+            table = robust_table(robots, model, basis, limits, worst, partial(say, options), **where)
         else:
             table = build_table(robot, model, limits, partial(say, options), resume=unfinished, **where)
     except KeyboardInterrupt:
@@ -319,8 +337,11 @@ def _run_table(options: argparse.Namespace) -> Answer:
         *save_figure(table.figure(), options.out / "pareto"),
     ]
     if (
-        limits == Limits(pressure_kpa=TABLE_PRESSURE_KPA) and not options.warm
-    ):  # then `plan` may take it without being told
+        options.stiffness and len(robots) > 1
+    ):  # which robot the table's motion is that of, and how far it may be off
+        files.append(save_robot(robot, options.out / "nominal_robot.yaml"))
+    usual = limits == Limits(pressure_kpa=TABLE_PRESSURE_KPA)
+    if usual and not options.warm and len(robots) == 1:  # then `plan` may take it without being told
         files.append(save_table(table, cached_table_path(robot, model)))
     shutil.rmtree(unfinished, ignore_errors=True)
     fastest = max(table.gaits, key=lambda g: g.speed_m_s)
@@ -335,6 +356,9 @@ def _run_table(options: argparse.Namespace) -> Answer:
         "solve_s": seconds,
     }
     words = f"{len(table.gaits)} gaits up to {fastest.speed_m_s:.3f} m/s in {seconds:.0f} s"
+    if len(robots) > 1:
+        answer["worst_speed_m_s"] = table.gaits[0].worst_speed_m_s
+        words += robust_words(table, robots)
     good = True
     if options.judge:
         say(options, "asking the other engine")

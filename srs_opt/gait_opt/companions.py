@@ -44,16 +44,28 @@ def wave_family(
 
 def _family(robot: Robot, leaning: Callable[[float], Gait], model: str) -> GaitTable:
     entries = []
-    for offset in [sign * size for size in OFFSETS for sign in ((1, -1) if size else (1,))]:
-        for way, turned in (("", _unchanged), (" back", end_for_end)):
-            try:
-                orbit = steady_gait(robot, in_step(turned(leaning(offset)), TICK_S), model)
-            except NoAnswerError:
-                continue
-            entry = TableGait.of_orbit(f"{offset:+g}{way}", orbit)
-            if abs(entry.speed_m_s) > SLOWEST_M_S:
-                entries.append(entry)
+    for name, gait in _gaits(leaning, TICK_S):
+        try:
+            orbit = steady_gait(robot, gait, model)
+        except NoAnswerError:
+            continue
+        entry = TableGait.of_orbit(name, orbit)
+        if abs(entry.speed_m_s) > SLOWEST_M_S:
+            entries.append(entry)
     return GaitTable(robot.name, robot.fingerprint(), model, tuple(entries))
+
+
+def leaned_gaits(gait: Gait, tick_s: float) -> list[tuple[str, Gait]]:
+    """Return a straight gait leaned to either side, forward and backward, by name."""
+    return _gaits(lambda offset: leaned(gait, math.asin(offset) / math.pi), tick_s)
+
+
+def _gaits(leaning: Callable[[float], Gait], tick_s: float) -> list[tuple[str, Gait]]:
+    return [
+        (f"{offset:+g}{way}", in_step(turned(leaning(offset)), tick_s))
+        for offset in [sign * size for size in OFFSETS for sign in ((1, -1) if size else (1,))]
+        for way, turned in (("", _unchanged), (" back", end_for_end))
+    ]
 
 
 def _unchanged(gait: Gait) -> Gait:

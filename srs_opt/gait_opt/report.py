@@ -12,6 +12,7 @@ from srs_opt.gait_opt.robust import published_orbit
 from srs_opt.gait_opt.score import transport_cost
 from srs_opt.gait_opt.search import Found
 from srs_opt.gait_opt.softness import STIFFNESSES_N_M2, robust_beside, speeds_at_stiffness
+from srs_opt.gait_opt.table import GaitTable
 from srs_opt.robot import Robot
 
 _PRICES_TOLD = 4  # the dearest limits; the JSON has all
@@ -111,6 +112,15 @@ def soft_speeds(robot: Robot, gait: Gait, beside: Limits | None) -> dict[str, An
         "speed_at_stiffness": listed(own),
         "robust_speed_at_stiffness": [entry for speeds in robust for entry in listed(speeds)],
     }
+
+
+def robust_words(table: GaitTable, robots: tuple[Robot, ...]) -> str:
+    """Return what a table for several robots says of itself."""
+    first = table.gaits[0]
+    return (
+        f", chosen for {len(robots)} robots, not optimized: the first, '{first.name}', makes at least "
+        f"{first.worst_speed_m_s:.3f} m/s on each; motions are those of '{robots[0].name}'"
+    )
 
 
 def summary(answer: dict[str, Any]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 from srs_opt.errors import NoAnswerError
@@ -32,6 +33,16 @@ def stiffness_interval(robot: Robot) -> tuple[Robot, ...]:
         return (robot,)
     reach = math.exp(INTERVAL_SD * sd)
     return robot, of_stiffness(robot, ei / reach), of_stiffness(robot, ei * reach)
+
+
+def in_the_middle(robots: Sequence[Robot]) -> tuple[Robot, ...]:
+    """Return robots that differ in stiffness, the middle one first, its deviation covering the others."""
+    order = sorted(robots, key=lambda robot: robot.bending_stiffness_n_m2 or math.inf)
+    nominal = order.pop(len(order) // 2)
+    stiffnesses = [robot.bending_stiffness_n_m2 or math.inf for robot in robots]
+    reach = max(abs(math.log(ei / (nominal.bending_stiffness_n_m2 or math.inf))) for ei in stiffnesses)
+    deviations = {**nominal.relative_sd, "bending_stiffness_n_m2": reach / INTERVAL_SD}
+    return nominal.with_values(relative_sd=deviations), *order
 
 
 def published_orbit(problem: CycleProblem, robot: Robot) -> Orbit:

@@ -68,6 +68,8 @@ class TableGait:
         Per cycle.
     certificate : EntryCertificate, optional
         None where the motion is taken from the model without one.
+    worst_speed_m_s : float, optional
+        Of a table for several robots: the least of the speeds that they make, without sign.
     """
 
     name: str
@@ -79,6 +81,7 @@ class TableGait:
     displacement: tuple[float, float, float]
     friction_work_j: float
     certificate: EntryCertificate | None = None
+    worst_speed_m_s: float | None = None
 
     @property
     def settling_s(self) -> float | None:
@@ -112,6 +115,7 @@ class TableGait:
             "envelope_m": list(self.envelope_m),
             "displacement": list(self.displacement),
             "friction_work_j": self.friction_work_j,
+            **({} if self.worst_speed_m_s is None else {"worst_speed_m_s": self.worst_speed_m_s}),
             **({} if found is None else {"settling_s": self.settling_s, "certificate": dict(vars(found))}),
         }
 
@@ -130,6 +134,7 @@ class TableGait:
             (dx, dy, turn),
             record["friction_work_j"],
             EntryCertificate(**record["certificate"]) if "certificate" in record else None,
+            record.get("worst_speed_m_s"),
         )
 
 

@@ -136,6 +136,13 @@ def describe(record: dict[str, Any]) -> str:
 
 
 def _bending_words(bending: BendingFit) -> str:
+    if bending.scaled is not None:
+        bend, slower = bending.scaled
+        words = (
+            f"no bending stiffness: on the ground segments bend {bend:.3f} times as far and take "
+            f"{slower:.3f} times as long, at every pressure alike, which no bending moment does"
+        )
+        return f"{words} ({bending.pairs} steps on the ground against their lifted twins)"
     if bending.stiffness_n_m2 is None or bending.relative_sd is None:
         words = f"bending stiffness above {bending.stiffer_than_n_m2:.2g} N m^2: as good as rigid"
     else:

@@ -6,6 +6,9 @@ test of a segment tells what drives the test on the ground, and the simulated st
 ground has one unknown, the flexibility 1/EI; amplitudes, time constants and friction across the wheels are
 nuisance parameters with the deviations that they are known to.
 
+A ground that takes a share of every bend and slows every step alike, whatever the pressure, is something
+else: curves that lifted ones on another scale explain better get no stiffness (`BendingFit.scaled`).
+
 Friction is dry here: smoothed with the robot's own speed the loss would creep away within a second or two.
 """
 
@@ -19,7 +22,7 @@ import numpy as np
 from srs_opt.errors import NoAnswerError
 from srs_opt.measurement.actuator_bench import ActuatorBench, combine_steps
 from srs_opt.measurement.records import Array, StepTest
-from srs_opt.measurement.steps import StepFit, fit_steps
+from srs_opt.measurement.steps import StepFit, fit_steps, step_response
 from srs_opt.model.effects import known_effects
 from srs_opt.robot import Robot
 from srs_opt.simulate.integrate import Integrator
@@ -33,6 +36,8 @@ STARTS = (5.0, 50.0, 200.0, 500.0)  # 1/(N m^2): EI from 0.2 down to 0.002
 LEAST = 0.02  # 1/(N m^2); an EI of 50 is rigid for any snake
 ITERATIONS, SETTLED = 12, 1e-3
 DETECTED_SD = 2.0
+# of twice the log likelihood: how much better another scale has to explain the tests than a bending moment
+SCALED = 10.0
 NO_RHYTHM_HZ = 1e-9  # a single step has no frequency for the supply to droop with
 
 
@@ -53,6 +58,9 @@ class BendingFit:
         makes of the lifted ones.
     pairs : int
         Tests on the ground that were used.
+    scaled : (bend, time) or None
+        Where the tests on the ground are the lifted ones on another scale, rather than what a bending moment
+        leaves of them: these scales. There is no stiffness then.
     """
 
     flexibility_1_n_m2: float
@@ -62,6 +70,7 @@ class BendingFit:
     stiffer_than_n_m2: float
     misfit: float
     pairs: int
+    scaled: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -227,7 +236,9 @@ def _fit(problem: _Problem) -> BendingFit:
     readings = residual.size - nuisance.size
     misfit = cost / max(readings - 1, 1)
     sd = float(np.sqrt(np.linalg.inv(jacobian.T @ jacobian)[0, 0] * max(misfit, 1.0)))
-    detected = flexibility > DETECTED_SD * sd
+    alike, scales = _scaled(problem)
+    scaled = scales if alike < cost - SCALED else None
+    detected = flexibility > DETECTED_SD * sd and scaled is None
     return BendingFit(
         flexibility_1_n_m2=flexibility,
         flexibility_sd_1_n_m2=sd,
@@ -236,16 +247,40 @@ def _fit(problem: _Problem) -> BendingFit:
         stiffer_than_n_m2=1 / (flexibility + 1.96 * sd),
         misfit=misfit,
         pairs=len(problem.pairs),
+        scaled=scaled,
     )
+
+
+def _scaled(problem: _Problem) -> tuple[float, tuple[float, float]]:
+    """Return squared residuals of the lifted curves on other scales of bend and time, and these scales."""
+    from scipy.optimize import least_squares
+
+    mean, spread = problem.known[:2]
+
+    def residuals(x: Array) -> Array:
+        scales = np.maximum(np.abs(x[:2]), 1e-3)
+        moved = x[2:] * problem.sds[3:]
+        amplitudes = problem.known[3:] + moved
+        curves = [
+            scales[0] * a * step_response(p.ground.time_s / scales[1], mean, spread**2)
+            for a, p in zip(amplitudes, problem.pairs)
+        ]
+        misses = [(c - np.abs(p.ground.curvature_1_m)) / p.noise_1_m for c, p in zip(curves, problem.pairs)]
+        return np.concatenate([*misses, x[2:]])
+
+    found = least_squares(residuals, [1.0, 1.0, *np.zeros(len(problem.pairs))])
+    return 2 * float(found.cost), (float(found.x[0]), float(found.x[1]))
 
 
 def bench_robot(robot: Robot, actuator: ActuatorBench, bending: BendingFit) -> Robot:
     """Return the robot with no-load curvature, time constants and stiffness from step tests.
 
-    The lifted tests give the no-load values; `relative_sd` says how well they are known, `sources` that they
+    The lifted tests give the no-load values (those on the ground, where these are `BendingFit.scaled`);
+    `relative_sd` says how well they are known, `sources` that they
     come from the bench.
     """
-    slope, constants = actuator.slope("lifted"), actuator.constants("lifted")
+    condition = "lifted" if bending.scaled is None else "ground"
+    slope, constants = actuator.slope(condition), actuator.constants(condition)
     values = {
         "curvature_per_pressure_1_m_kpa": (slope.value, slope.sd),
         "tau1_s": (constants.tau1_s, constants.tau1_sd_s),

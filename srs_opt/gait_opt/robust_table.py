@@ -1,0 +1,118 @@
+"""A gait table for several robots: for segments of unknown stiffness above all.
+
+Optimizing every entry for all robots takes hours (a robust gait takes minutes). Here entries are chosen,
+not optimized: those of the rigid robot's table and the robust gait with its turning companions, simulated on
+every robot. What is unstable, creeps or turns to another side on one of them is left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from srs_opt.errors import InputError, NoAnswerError
+from srs_opt.gait import Gait, published_wave
+from srs_opt.gait_opt.aim import on_ticks
+from srs_opt.gait_opt.companions import leaned_gaits
+from srs_opt.gait_opt.entries import certified_table
+from srs_opt.gait_opt.goal import STRAIGHT_RAD_S, Limits
+from srs_opt.gait_opt.replayed import SLOWEST_M_S
+from srs_opt.gait_opt.softness import robust_beside
+from srs_opt.gait_opt.table import GaitTable, TableGait
+from srs_opt.orbit.steady import Orbit, steady_gait, steady_gaits
+from srs_opt.robot import Robot
+
+Say = Callable[[str], None]
+
+
+def robust_companions(robot: Robot, limits: Limits) -> list[tuple[str, Gait]]:
+    """Return the robust gait, straight and leaned, by name; none for robots with other segments."""
+    gait = robust_beside(robot, limits)
+    if gait is None:
+        return []
+    return [
+        (_name(name), on_ticks(other, limits.tick_s)) for name, other in leaned_gaits(gait, limits.tick_s)
+    ]
+
+
+def _name(leaning: str) -> str:
+    """Return an entry's name, as "robust L0.3 back", for that of a companion, "+0.3 back"."""
+    offset, *way = leaning.split()
+    side = {"+": "L", "-": "R"}[offset[0]] if float(offset) else ""
+    return " ".join(["robust", *([side + offset[1:]] if side else []), *way])
+
+
+def robust_table(
+    robots: tuple[Robot, ...],
+    model: str,
+    rigid: GaitTable,
+    limits: Limits,
+    worst: str = "relative",
+    say: Say = lambda text: None,
+    *,
+    jobs: int = 1,
+    cluster: str | None = None,
+) -> GaitTable:
+    """Return the gaits that serve all `robots`, the best worst speed first; the motion is the first robot's.
+
+    Parameters
+    ----------
+    rigid : GaitTable
+        Gaits to choose from, besides the robust gait and its companions.
+    worst : {"relative", "absolute"}
+        What counts of the robots: speed over the published gait's, or speed.
+
+    Raises
+    ------
+    InputError
+        If the robots have different numbers of links.
+    NoAnswerError
+        If no gait serves all, or the published gait does not move one of them.
+    """
+    if len({robot.links for robot in robots}) > 1:
+        raise InputError("a gait table for several robots needs the same number of links in all of them")
+    named = [(entry.name, entry.gait) for entry in rigid.gaits]
+    named += robust_companions(robots[0], limits)
+    named = [(name, gait) for name, gait in named if _allowed(gait, limits)]
+    found = [steady_gaits(robot, [gait for _, gait in named], model, jobs=jobs) for robot in robots]
+    scale = np.ones(len(robots))
+    if worst == "relative":
+        fastest = (limits.frequency_hz[1], limits.pressure_kpa[1])
+        published = (steady_gait(r, published_wave(r, *fastest).gait(), model) for r in robots)
+        scale = np.array([orbit.speed_m_s for orbit in published])
+    kept: list[tuple[float, TableGait]] = []
+    for (name, _), orbits in zip(named, zip(*found)):
+        if good := _alike(orbits):
+            speeds = np.array([abs(orbit.speed_m_s) for orbit in good])
+            entry = replace(TableGait.of_orbit(name, good[0]), worst_speed_m_s=float(speeds.min()))
+            kept.append((float((speeds / scale).min()), entry))
+    if not kept:
+        raise NoAnswerError("no gait of the table serves all of the robots")
+    kept.sort(key=lambda pair: -round(pair[0], 3))  # images of one gait stay together, forward first
+    say(f"{len(kept)} of {len(named)} gaits serve all {len(robots)} robots")
+    table = GaitTable(robots[0].name, robots[0].fingerprint(), model, tuple(entry for _, entry in kept))
+    return certified_table(robots[0], table, limits, say, jobs=jobs, cluster=cluster)
+
+
+def _allowed(gait: Gait, limits: Limits) -> bool:
+    low, high = limits.pressure_kpa
+    slow, fast = limits.frequency_hz
+    return (
+        low - 1e-9 <= gait.pressure_kpa <= high + 1e-9
+        and slow <= gait.frequency_hz * (1 + 1e-9)
+        and (gait.frequency_hz <= fast * (1 + 1e-9))
+    )
+
+
+def _alike(orbits: tuple[Orbit | NoAnswerError, ...]) -> list[Orbit]:
+    """Return the orbits if all are stable and move on the same way and to the same side; else none."""
+    moving = [orbit for orbit in orbits if not isinstance(orbit, NoAnswerError)]
+    good = [o for o in moving if o.largest_multiplier < 1 and abs(o.speed_m_s) >= SLOWEST_M_S]
+    ways = {(o.speed_m_s > 0, _side(o.turn_rate_rad_s)) for o in good}
+    return good if len(good) == len(orbits) and len(ways) == 1 else []
+
+
+def _side(turn_rate_rad_s: float) -> int:
+    return 0 if abs(turn_rate_rad_s) < STRAIGHT_RAD_S else int(np.sign(turn_rate_rad_s))
