@@ -22,7 +22,7 @@ from benchmarks.stored import gather, stored_rows, study_parser
 
 ALONG, ACROSS = "friction along the wheels", "friction across the wheels"
 LOAD, FORCE, STEERING = "load or mass", "force", "direction of the wheels"
-GAIN, TIME, CAMERA = "actuator's gain", "actuator's time", "camera"
+LENGTH, GAIN, TIME, CAMERA = "length", "actuator's gain", "actuator's time", "camera"
 # what acts; more than one where they are the same thing on a robot that goes forward
 KINDS: Mapping[str, tuple[str, ...]] = {
     "quadratic_drag": (FORCE, ALONG),
@@ -42,7 +42,7 @@ KINDS: Mapping[str, tuple[str, ...]] = {
     "warming_silicone": (TIME,),
     "leaking_segment": (GAIN,),
     "lopsided_chambers": (GAIN,),
-    "long_segment": (GAIN,),
+    "long_segment": (LENGTH,),
     "payload": (LOAD,),
     "lens_barrel": (CAMERA,),
     "rolling_shutter": (CAMERA,),

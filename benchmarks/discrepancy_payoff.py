@@ -1,6 +1,6 @@
 """What naming the effect buys, driven on the laboratory's truth.
 
-    python -m benchmarks.discrepancy_payoff [--effects curvature_bias gap_bending tether_drag] [--maze FILE]
+    python -m benchmarks.discrepancy_payoff [--effects NAME ...] [--maze FILE]
 
 For every effect: a generated data set in which it is hidden, the calibrated robot (before) and the corrected
 robot (after). Each optimizes its fastest gait; the laboratory, which shares no code with the models, plays
@@ -38,7 +38,7 @@ from virtual_lab.simulate import look, sample
 from virtual_lab.trials import Schedule, Trial
 from virtual_lab.truth import Truth
 
-EFFECTS = ("curvature_bias", "gap_bending", "tether_drag")
+EFFECTS = ("curvature_bias", "gap_bending", "tether_drag", "hysteresis")
 MARGIN_M = 0.01
 FRAMES = 40  # per cycle
 SETTLED, MEASURED = 10, 10  # cycles

@@ -1,10 +1,10 @@
 """Generic effects: what is in no list, described by terms of a grammar.
 
 A term says what acts (friction along or across the wheels, load, mass, force, moment, the wheels'
-direction; a segment's gain or time; the camera), on what it depends (nothing, direction of motion, speed,
-curvature, place on the body or in the room, side, neighbours, time, pressure), and where it sits: all links
-or segments, or any one. Each is an `Effect` as those of the library are, named ``generic_...``, so that a
-robot file can hold it. They are asked only after the listed effects have failed.
+direction; a segment's length, gain or time; the camera), on what it depends (nothing, direction of motion,
+speed, curvature, place on the body or in the room, side, neighbours, time, pressure), and where it sits: all
+links or segments, or any one. Each is an `Effect` as those of the library are, named ``generic_...``, so that
+a robot file can hold it. They are asked only after the listed effects have failed.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from srs_opt.model.effects.parameter import Component, Direction, EffectParamete
 # what acts
 ALONG, ACROSS = "friction along the wheels", "friction across the wheels"
 LOAD, FORCE, STEERING = "load or mass", "force", "direction of the wheels"
+LENGTH = "length"
 GAIN, TIME, CAMERA = "actuator's gain", "actuator's time", "camera"
 
 BLUR_M_S = 2e-4  # half the width of a change with the direction of motion, as in reverse_friction
@@ -170,6 +171,7 @@ _LOOK = {
     LOAD: "put a scale under the wheels of every link",
     FORCE: "watch what the robot drags, what pulls it and what it touches",
     STEERING: "sight along the wheels of every link while its segments are bent",
+    LENGTH: "lay a ruler along every segment and gap",
     GAIN: "pressurize one segment after the other, left and right, and read the curvatures",
     TIME: "film a step of one segment after the other, left and right",
     CAMERA: "film a ruler at several places of the picture, and a stopwatch",
@@ -284,6 +286,9 @@ _ENTRIES = (
            "the wheels turn with the curvature beside them, by {size} per 1/m",
            {"steering": lambda e, curvature: e["per_curvature"] * curvature}, (0.0, 1000.0, "mrad")),
     # segments
+    _Entry("length_segment", "body", LENGTH, "", (_p("extra", "", 0.3, -0.8), segment()),
+           "the chamber of segment {segment} is {size} times as long as the others",
+           {"stretch": lambda e, no_load: e["extra"]}, _FACTOR),
     _Entry("gain_segment", "actuation", GAIN, "", (_p("ratio", "", 0.1, -0.9), segment()),
            "segment {segment} bends {size} times as far as the others",
            {"gain": lambda e, frequency: 1 + e["ratio"]}, _FACTOR),
