@@ -29,7 +29,8 @@ def build_parser() -> Parser:
         "values as priors; write robot.yaml with estimates and relative standard deviations.\n"
         "JSON: parameters and sd (SI units, pressure in kPa), unidentifiable (directions the data say\n"
         "nothing about), misfit {before, after} (root mean square over the noise), warnings (values more\n"
-        "than three standard deviations from the bench), data (tracks or maps)\n"
+        "than three standard deviations from the bench), noise (per coordinate, as the tracks show it; null\n"
+        "from maps), set_aside (trials that were not used, and why), data (tracks or maps)\n"
         "and, from maps alone, sd_with_tracks (what tracks of the same gaits would leave; else null).",
         "python -m srs_opt.calibrate data/my_set --json",
         robot=False,
@@ -65,6 +66,9 @@ def _summary(found: Calibration) -> str:
     if found.unidentifiable:
         lines.append("the data say nothing about: " + "; ".join(found.unidentifiable))
     lines += [f"warning: {text}" for text in found.warnings]
+    if found.noise is not None:
+        lines.append(f"noise per coordinate: {found.noise.in_words}")
+    lines += [f"trial {name} set aside: {why}" for name, why in found.set_aside.items()]
     if found.sd_with_tracks is not None:
         lines.append("from maps alone; 8 s of track of every gait would know better by the factor")
         less = {n: sd / found.sd_with_tracks[n] for n, sd in found.sd.items()}

@@ -20,6 +20,7 @@ FEWEST, MOST = 2, 5  # frames to either side
 # robust deviations of a position from the parabola through its neighbours beyond which it is left out: by
 # chance one in a million. Half as many would leave out one good position in a hundred and bias the noise.
 FAR = 5.0
+NEARBY = 5  # times that reach: a neighbourhood, of which an outlier spoils a fifth
 PASSES = 12  # a marker that is elsewhere for several frames spoils its neighbours' parabolas
 _MAD = 0.674489750196
 
@@ -98,20 +99,30 @@ def outliers_of(points: Array, time_s: Array) -> np.ndarray:
         return wild
     frame_s = float(np.median(np.diff(time_s)))
     reach = int(np.clip(round(REACH_S / frame_s), FEWEST, MOST)) if frame_s > 0 else FEWEST
-    scale = None
+    off, sure = _off_parabola(points, reach)
+    size = np.where(sure, np.max(np.abs(off), axis=2), 0.0)
+    if not sure.any():
+        return wild
+    # where a quiet camera sees a quick motion, its parabolas are off by more than the noise
+    usual = np.median(np.abs(off[sure])) / _MAD
+    limit = FAR * np.maximum(usual, _usual_nearby(size, NEARBY * reach))
+    some = np.arange(markers)
     for _ in range(PASSES):
-        off, sure = _off_parabola(np.where(wild[..., None], np.nan, points), reach)
-        if scale is None:
-            if not sure.any():
-                break
-            scale = np.median(np.abs(off[sure])) / _MAD
-        size = np.where(sure, np.max(np.abs(off), axis=2), 0.0)
-        farthest = size >= _largest_nearby(size, reach)
-        found = farthest & (size > FAR * scale)
-        if not found.any():
+        found = (size >= _largest_nearby(size, reach)) & (size > limit[:, some])
+        wild[:, some] |= found
+        again = found.any(axis=0)
+        some = some[again]
+        if not some.size:
             break
-        wild |= found
+        off, sure = _off_parabola(np.where(wild[:, some, None], np.nan, points[:, some]), reach)
+        size = np.where(sure, np.max(np.abs(off), axis=2), 0.0)
     return wild
+
+
+def _usual_nearby(size: Array, reach: int) -> Array:
+    from scipy.ndimage import median_filter
+
+    return np.asarray(median_filter(size, (2 * reach + 1, 1), mode="nearest"))
 
 
 def _largest_nearby(size: Array, reach: int) -> Array:

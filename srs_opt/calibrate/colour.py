@@ -20,6 +20,7 @@ from srs_opt.measurement.records import Trial
 HARMONICS = 4  # free in every distance
 # correlation times, and variances of the correlated part over the white one's, from which it is looked for
 TIMES_S, SHARES = (0.05, 0.2, 0.8), (0.02, 0.15)
+FIRST_STEPS = (0.03, 0.4, 0.8)  # of the search for the maximum, in the logarithms of both deviations and time
 # drop of the deviance from which on noise counts as correlated: by chance once in some thousand sets
 CLEARLY = 12.0
 
@@ -49,7 +50,9 @@ def coloured(noise: Noise, trials: Sequence[Trial], residuals: Sequence[np.ndarr
         white, walk, time = np.exp(log)
         return _deviance(Noise(white, walk, time), data)
 
-    best = minimize(of, start, method="Nelder-Mead", options={"xatol": 0.02, "fatol": 0.3, "maxfev": 90})
+    simplex = start + np.vstack([np.zeros(3), np.diag(FIRST_STEPS)])
+    options = {"xatol": 0.02, "fatol": 0.2, "maxfev": 120, "initial_simplex": simplex}
+    best = minimize(of, start, method="Nelder-Mead", options=options)
     white, walk, time = np.exp(best.x)
     return replace(noise, white_sd_m=float(white), correlated_sd_m=float(walk), correlation_s=float(time))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -44,6 +44,8 @@ class Calibration(Result):
         By how many of its deviations each value lies from its bench value.
     noise : Noise or None
         That the tracks show; None from maps.
+    set_aside : mapping
+        Trials that could not be used or contradict their entry or the others, and why.
     sd_with_tracks : dict or None
         For a calibration from maps alone: the deviations that tracks of the same gaits would leave.
     """
@@ -57,6 +59,7 @@ class Calibration(Result):
     after: float
     off_bench: Mapping[str, float] = field(default_factory=dict)
     noise: Noise | None = None
+    set_aside: Mapping[str, str] = field(default_factory=dict)
     sd_with_tracks: dict[str, float] | None = None
 
     @property
@@ -73,6 +76,8 @@ class Calibration(Result):
             "unidentifiable": list(self.unidentifiable),
             "misfit": {"before": self.before, "after": self.after},
             "warnings": list(self.warnings),
+            "noise": None if self.noise is None else asdict(self.noise),
+            "set_aside": [{"trial": name, "reason": why} for name, why in self.set_aside.items()],
             "data": "tracks" if self.sd_with_tracks is None else "maps",
             "sd_with_tracks": self.sd_with_tracks,
             "correlation": {

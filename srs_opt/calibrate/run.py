@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+from srs_opt.calibrate.apart import stands_apart
 from srs_opt.calibrate.candidates import fitted_coordinates
 from srs_opt.calibrate.clean import mended
 from srs_opt.calibrate.colour import coloured
@@ -18,9 +19,11 @@ from srs_opt.calibrate.result import Calibration, calibration
 from srs_opt.calibrate.slow import Amplitudes, smooth_part
 from srs_opt.calibrate.smooth import DRIFTS, unit_terms
 from srs_opt.errors import InputError
-from srs_opt.measurement.records import DataSet
+from srs_opt.measurement.records import DataSet, Trial
 from srs_opt.parallel import HERE, Executor
 from srs_opt.robot import Robot
+
+REFIT_ITERATIONS = 20
 
 
 def calibrate(
@@ -40,14 +43,14 @@ def calibrate(
     NoAnswerError
         If the robot cannot be simulated under the trials' conditions.
     """
-    from srs_opt.calibrate.usable import usable
+    from srs_opt.calibrate.usable import left_out
 
     tell = report or (lambda message: None)
     dataset = _mended(dataset, tell)
-    trials = [t for t in dataset.trials if not usable(t)]
-    for t in dataset.trials:
-        if usable(t):
-            tell(f"trial {t.name} left out: {usable(t)}")
+    aside = left_out(dataset.trials)
+    for name, why in aside.items():
+        tell(f"trial {name} left out: {why}")
+    trials = [t for t in dataset.trials if t.name not in aside]
     if not trials:
         if not dataset.maps:
             raise InputError(f"data set '{dataset.name}': no usable trial and no map to calibrate on")
@@ -62,14 +65,39 @@ def calibrate(
     base = fitted_coordinates(dataset.robot)
     experiment = Experiment(Model(dataset.robot, model), trials, noise_of(dataset), dataset.bench, where)
     found = fit(experiment, base, start_point(base), report=tell)
-    noise = _noise_left(experiment, found)
+    noise = _noise_left(experiment, found, trials)
     if noise != experiment.noise:
         tell(f"noise: {noise.in_words}")
         experiment = experiment.with_noise(noise)
         start_ratio = found.start_misfit_ratio
         found = replace(fit(experiment, base, found.point, report=tell), start_misfit_ratio=start_ratio)
-    before, after = math.sqrt(found.start_misfit_ratio), math.sqrt(found.misfit_ratio)
-    return calibration(dataset.robot, found, before, after, noise)
+    before = math.sqrt(found.start_misfit_ratio)
+    experiment, found, odd = _without_odd(experiment, found)
+    for name, why in odd.items():
+        tell(f"trial {name} left out: {why}")
+    result = calibration(dataset.robot, found, before, math.sqrt(found.misfit_ratio), experiment.noise)
+    return replace(result, set_aside=aside | odd)
+
+
+def _without_odd(experiment: Experiment, found: Fit) -> tuple[Experiment, Fit, dict[str, str]]:
+    """Return the fit to the trials that do not contradict all others, and those that do."""
+
+    coordinates = found.coordinates
+
+    def refit(names: Sequence[str]) -> Fit:
+        rest = [t for t in experiment.trials if t.name not in names]
+        # from the bench's values: what the fit to all found is bent by the very trial that is left out
+        return fit(experiment, coordinates, None, rest, REFIT_ITERATIONS)
+
+    odd, found = stands_apart(experiment, found, experiment.trials, refit)
+    if not odd:
+        return experiment, found, odd
+    rest = [t for t in experiment.trials if t.name not in odd]
+    noise = _noise_left(experiment, found, rest)
+    if noise != experiment.noise:
+        experiment = experiment.with_noise(noise)
+        found = fit(experiment, found.coordinates, found.point, rest)
+    return experiment, found, odd
 
 
 def _mended(dataset: DataSet, tell: Callable[[str], None]) -> DataSet:
@@ -82,11 +110,11 @@ def _mended(dataset: DataSet, tell: Callable[[str], None]) -> DataSet:
     return found.dataset
 
 
-def _noise_left(experiment: Experiment, found: Fit) -> Noise:
+def _noise_left(experiment: Experiment, found: Fit, trials: Sequence[Trial]) -> Noise:
     """Return the noise that a fit's residuals show, smooth errors only if they explain all that is left."""
-    trials, first = experiment.trials, len(found.coordinates)
+    first = len(found.coordinates)
     noise = coloured(experiment.noise, trials, experiment.residuals(trials, found.point))
-    grams = experiment.with_noise(noise).grams(found.point, found.coordinates, extra=unit_terms)
+    grams = experiment.with_noise(noise).grams(found.point, found.coordinates, trials, unit_terms)
     columns = range(first, next(iter(grams.values())).raw.shape[0] - 1)
     units = [dict.fromkeys(some, 1.0) for some in (columns[:DRIFTS], columns[DRIFTS:])]
     amplitudes = {t.name: Amplitudes(*units) for t in trials}

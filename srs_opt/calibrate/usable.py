@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from srs_opt.calibrate.entries import contradicted
 from srs_opt.calibrate.noise import track_of
 from srs_opt.measurement.records import Trial
 
 _PASSIVE = ("tow", "push")  # somebody's hand moves the robot: not simulated
 _LEAST_FRAMES, _LEAST_SEEN = 20, 0.3
+MOST_WRONG = 0.34  # share of the trials that may be entered wrongly
 
 
 def usable(trial: Trial) -> str:
@@ -24,3 +28,14 @@ def usable(trial: Trial) -> str:
     if not np.all(np.diff(trial.time_s) > 0):
         return "its clock does not run forward"
     return ""
+
+
+def left_out(trials: Sequence[Trial]) -> dict[str, str]:
+    """Return the trials that cannot be used, or whose own tracks contradict what is entered, and why.
+
+    Where most tracks contradict their entries, it is not the entries: markers are counted from the head, say.
+    """
+    found = {t.name: why for t in trials if (why := usable(t))}
+    rest = [t for t in trials if t.name not in found]
+    wrong = {t.name: why for t in rest if (why := contradicted(t))}
+    return found | wrong if len(wrong) <= MOST_WRONG * len(rest) else found

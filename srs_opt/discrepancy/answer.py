@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -36,12 +37,7 @@ def answer(found: Discrepancy, robot_file: Path | None) -> dict[str, Any]:
         "lead": found.gap.lead if found.gap and shown else None,
         "remainder": _remainder(found),
         "would_have_seen": _would_have_seen(found),
-        "noise": {
-            "white_sd_m": found.sd_m,
-            "correlated_sd_m": found.dataset.correlated_sd_m,
-            "correlation_s": found.dataset.correlation_s,
-            "outlier_share": None,
-        },
+        "noise": {**asdict(found.noise), "outlier_share": found.outlier_share},
         "set_aside": [{"trial": name, "reason": why} for name, why in found.set_aside],
         "alike": [{"effects": list(p.effects), "angle_rad": round(p.angle_rad, 4)} for p in found.alike],
         "alternatives": [list(h.names) for h in rivals],

@@ -9,7 +9,6 @@ from srs_opt.calibrate.objective import sum_eliminated
 from srs_opt.discrepancy.examined import Examined
 from srs_opt.discrepancy.hypothesis import Hypothesis
 
-ODD = 3.0
 CLOSES = 0.5  # share of the misfit that a fit must close to say where the gap is
 STAGES = {
     "actuation": "valves to curvature",
@@ -93,12 +92,4 @@ def misfit_by_trial(examined: Examined) -> dict[str, float]:
     return {n: g.misfit / max(g.count, 1) for n, g in examined.linearisation.grams.items()}
 
 
-def odd_trials(examined: Examined) -> tuple[str, ...]:
-    """Return the few trials whose misfit is several times that of most, worst first."""
-    misfit = {n: m for n, m in misfit_by_trial(examined).items() if examined.linearisation.grams[n].scattered}
-    usual = sorted(misfit.values())[len(misfit) // 2]
-    odd = sorted((n for n, m in misfit.items() if m > ODD * usual and m > 1.2), key=lambda n: -misfit[n])
-    return tuple(odd) if len(odd) <= len(misfit) // 4 else ()
-
-
-__all__ = ["Place", "locate", "misfit_by_trial", "odd_trials", "stages", "sum_eliminated"]
+__all__ = ["Place", "locate", "misfit_by_trial", "stages", "sum_eliminated"]

@@ -6,26 +6,27 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+from srs_opt.calibrate.apart import stands_apart
 from srs_opt.calibrate.candidates import Candidate, all_candidates, fitted_coordinates
 from srs_opt.calibrate.clean import mended
 from srs_opt.calibrate.experiment import Experiment
-from srs_opt.calibrate.fit import FAR_OFF
+from srs_opt.calibrate.fit import Fit
 from srs_opt.calibrate.forms import form_of_entry
 from srs_opt.calibrate.model import Model
-from srs_opt.calibrate.noise import noise_of
+from srs_opt.calibrate.noise import Noise, noise_of
 from srs_opt.discrepancy.alike import Pair, alike_pairs
 from srs_opt.discrepancy.describe import Description, describe_gap
 from srs_opt.discrepancy.design import NextExperiment, next_experiment, repeat_of, rivals_of
 from srs_opt.discrepancy.examined import Examined
 from srs_opt.discrepancy.first import first_experiment
 from srs_opt.discrepancy.hypothesis import Hypothesis
-from srs_opt.discrepancy.locate import Place, locate, misfit_by_trial, odd_trials
+from srs_opt.discrepancy.locate import Place, locate, misfit_by_trial
 from srs_opt.discrepancy.screen import Score
 from srs_opt.discrepancy.seal import Gap, odd_sealed, open_seal
 from srs_opt.discrepancy.search import Search
 from srs_opt.discrepancy.select import Selection, best_rival, select
 from srs_opt.discrepancy.settings import SETTINGS
-from srs_opt.discrepancy.split import LEAST_OPEN, Split, few_and_brief, split_trials
+from srs_opt.discrepancy.split import Split, few_and_brief, split_trials
 from srs_opt.discrepancy.verdict import BELIEVED, DESCRIBED, NO_GAP, NOT_TESTABLE, UNKNOWN, Verdict, judge
 from srs_opt.discrepancy.visible import Visible, visible
 from srs_opt.measurement.records import DataSet
@@ -59,6 +60,8 @@ class Discrepancy:
         Trials set aside because they contradict the others, and what speaks against them.
     would_have_seen : Visible or None
         The smallest missing effect that the data would have shown; where they show none.
+    outlier_share : float or None
+        Share of positions that were left out; None where none were looked for.
     """
 
     dataset: DataSet
@@ -80,6 +83,12 @@ class Discrepancy:
     description: Description | None = None
     odd: tuple[tuple[str, str], ...] = ()
     would_have_seen: Visible | None = None
+    outlier_share: float | None = None
+
+    @property
+    def noise(self) -> Noise:
+        """What of the data is neither the model nor the trials' scatter."""
+        return Noise(self.sd_m) if self.experiment is None else self.experiment.noise
 
     @property
     def believed(self) -> bool:
@@ -126,7 +135,8 @@ def find_discrepancy(
     """
     started = time.perf_counter()
     tell = report or (lambda message: None)
-    dataset = mended(dataset).dataset
+    clean = mended(dataset)
+    dataset = clean.dataset
     split = split_trials(dataset.trials)
     noise = noise_of(replace(dataset, trials=split.open))
     if not split.enough:
@@ -139,7 +149,8 @@ def find_discrepancy(
     experiment = Experiment(Model(dataset.robot, model), trials, noise, dataset.bench, where, groups)
     candidates = _candidates(dataset, effects, experiment.model)
     search = Search(experiment, fitted_coordinates(dataset.robot), candidates, split.open, seed, tell, quick)
-    return _examine(dataset, search, split, tell, started, restricted=effects is not None)
+    found = _examine(dataset, search, split, tell, started, restricted=effects is not None)
+    return replace(found, outlier_share=clean.outlier_share)
 
 
 def _examine(
@@ -160,8 +171,10 @@ def _examine(
     first = search.coloured(first)
     tell(f"screening {len(search.candidates)} candidates")
     null = search.noise_aware(search.examine(first))
-    at_odds = contradicting(search, null) if null.detection.p_value < SETTINGS.detected else ()
-    searched = null.detection.p_value < SETTINGS.detected and not at_odds
+    if null.detection.p_value < SETTINGS.detected:
+        search, null, apart = without_odd(search, null)
+        split = split.without(apart)
+    searched = null.detection.p_value < SETTINGS.detected
     best, fitted = search.run(null) if searched else (null, [null.hypothesis])
     if search.experiment.noise != experiment.noise:
         null = null if best is null else search.examine(search.again(null.hypothesis))
@@ -176,9 +189,9 @@ def _examine(
     sealed = [t for t in split.sealed if t.name not in odd]
     if odd:
         gap = open_seal(experiment, *opened, sealed, search.seed, rival.fit if rival else None)
-    verdict = judge(null, best, selection, gap, at_odds, restricted=restricted)
+    verdict = judge(null, best, selection, gap, restricted=restricted)
     description = None
-    if verdict.word == UNKNOWN and not at_odds and not restricted:
+    if verdict.word == UNKNOWN and not restricted:
         tell(f"describing the gap with the {len(TERMS)} terms of the grammar")
         description = describe_gap(search, first, best.hypothesis, sealed)
     if description is not None and not description.why_not:
@@ -191,9 +204,9 @@ def _examine(
         tell("looking for the next experiment")
         stories = rivals_of(selection, fitted, null.hypothesis)
         following = next_experiment(experiment, stories, split.open)
-        if at_odds or following is None:
+        if following is None:
             misfit = misfit_by_trial(null)
-            worst = at_odds[0] if at_odds else max((t.name for t in split.open), key=lambda n: misfit[n])
+            worst = max((t.name for t in split.open), key=lambda n: misfit[n])
             following = repeat_of(worst, null.linearisation.grams, "something that the model lacks")
     return Discrepancy(
         dataset,
@@ -218,23 +231,23 @@ def _examine(
     )
 
 
-def contradicting(search: Search, null: Examined) -> tuple[str, ...]:
-    """Return the few trials, if any, without which calibration alone explains all the others."""
-    odd = odd_trials(null)[: len(search.trials) - LEAST_OPEN]
-    # most sets end here: what stays without all of them is not mended by leaving out fewer
-    if not odd or not _explained_without(search, null, odd):
-        return ()
-    counts = range(1, len(odd))
-    return next((odd[:k] for k in counts if _explained_without(search, null, odd[:k])), odd)
+def without_odd(search: Search, null: Examined) -> tuple[Search, Examined, dict[str, str]]:
+    """Return the search and calibration alone without the trials that contradict all others, and these."""
+    tried: dict[tuple[str, ...], tuple[Search, Hypothesis]] = {}
 
+    def refit(names: Sequence[str]) -> Fit | None:
+        rest = search.without(names)
+        found = rest.calibrate()  # from the bench's values: the fit to all is bent by what is left out
+        if found is None:
+            return None
+        tried[tuple(names)] = rest, found
+        return found.fit
 
-def _explained_without(search: Search, null: Examined, odd: Sequence[str]) -> bool:
-    """Whether calibration alone explains the trials other than `odd`."""
-    without = search.without(odd)
-    found = without.calibrate(null.hypothesis.fit.point, FAR_OFF)
-    if found is None or found.fit.temper > FAR_OFF:
-        return False
-    return without.examine(found).detection.p_value >= SETTINGS.detected
+    odd, _ = stands_apart(search.experiment, null.hypothesis.fit, search.trials, refit)
+    if not odd:
+        return search, null, odd
+    rest, found = tried[tuple(odd)]
+    return rest, rest.noise_aware(rest.examine(found)), odd
 
 
 def _candidates(dataset: DataSet, effects: Sequence[str] | None, model: Model) -> tuple[Candidate, ...]:

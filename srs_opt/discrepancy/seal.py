@@ -7,10 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from srs_opt.calibrate.coordinates import SCATTER_SD
-from srs_opt.calibrate.experiment import Experiment, Point
+from srs_opt.calibrate.apart import own_scatter
+from srs_opt.calibrate.experiment import Experiment
 from srs_opt.calibrate.fit import Fit
-from srs_opt.calibrate.objective import CORRELATED
 from srs_opt.discrepancy.motions import motion_errors
 from srs_opt.discrepancy.settings import SETTINGS, Settings
 from srs_opt.measurement.records import Trial
@@ -96,22 +95,7 @@ class Gap:
 
 def sealed_residuals(experiment: Experiment, fit: Fit, trials: Sequence[Trial]) -> list[np.ndarray]:
     """Return the residuals (T, 2 M) of every trial at the fit, with the trial's own most probable scatter."""
-    own = [c for c in fit.coordinates if c.name in SCATTER_SD]
-    point = Point(fit.point.values, {})
-    for _ in range(3):
-        grams = experiment.grams(point, own, trials)
-        moved, settled = {}, True
-        for trial in trials:
-            gram = grams[trial.name]
-            excess = gram.misfit / gram.count - 1 - 4 * np.sqrt(2 / gram.count)
-            back = gram.eliminated(1 + CORRELATED * max(0.0, excess)).back
-            now = point.scatter.get(trial.name, np.zeros(back.shape[0]))
-            moved[trial.name] = np.clip(now + back[:, -1], -4 * gram.scatter_sd, 4 * gram.scatter_sd)
-            settled &= bool(np.abs(moved[trial.name] - now).max() < 0.05 * gram.scatter_sd.min())
-        if settled:
-            break
-        point = Point(fit.point.values, moved)
-    return experiment.residuals(trials, point)
+    return experiment.residuals(trials, own_scatter(experiment, fit, trials))
 
 
 def open_seal(

@@ -7,13 +7,13 @@ that closes is a prediction of gaits that no fit has seen.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from zlib import crc32
 
 import numpy as np
 
-from srs_opt.calibrate.usable import usable
+from srs_opt.calibrate.usable import left_out
 from srs_opt.measurement.records import Trial
 
 SEALED_SHARE = 0.25
@@ -51,13 +51,17 @@ class Split:
         """Whether there is anything to test on."""
         return len(self.open) >= LEAST_OPEN and len(self.sealed) >= LEAST_SEALED
 
+    def without(self, reasons: Mapping[str, str]) -> Split:
+        """Return the split with open trials left out, by name, for a reason."""
+        rest = tuple(t for t in self.open if t.name not in reasons)
+        folds = tuple(tuple(n for n in fold if n not in reasons) for fold in self.folds)
+        return replace(self, open=rest, folds=folds, left_out=(*self.left_out, *reasons.items()))
+
 
 def split_trials(trials: Sequence[Trial]) -> Split:
     """Seal about a quarter of the trials, whole conditions at a time, and deal the others into folds."""
-    reasons = [(t.name, usable(t)) for t in trials]
-    left_out = tuple((name, why) for name, why in reasons if why)
-    names = {name for name, _ in left_out}
-    good = [t for t in trials if t.name not in names]
+    reasons = left_out(trials)
+    good = [t for t in trials if t.name not in reasons]
     groups = _conditions(good)
     chosen = _chosen(groups, len(good)) if len(good) > LEAST_OPEN else []
     sealed = [t for t in good if any(t in groups[k] for k in chosen)]
@@ -68,7 +72,7 @@ def split_trials(trials: Sequence[Trial]) -> Split:
             folds[k % len(folds)] += [t.name for t in group]
     gaits = {gait_of(t) for t in rest}
     new = not any(gait_of(t) in gaits for t in sealed)
-    return Split(tuple(rest), tuple(sealed), tuple(tuple(f) for f in folds if f), left_out, new)
+    return Split(tuple(rest), tuple(sealed), tuple(tuple(f) for f in folds if f), tuple(reasons.items()), new)
 
 
 def gait_of(trial: Trial) -> Hashable:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from srs_opt.discrepancy.examined import ADEQUATE, Examined, explained
@@ -28,7 +27,6 @@ def judge(
     best: Examined,
     selection: Selection | None,
     gap: Gap | None,
-    at_odds: Sequence[str] = (),
     settings: Settings = SETTINGS,
     *,
     restricted: bool = False,
@@ -37,8 +35,6 @@ def judge(
 
     Parameters
     ----------
-    at_odds : sequence of str
-        Trials without which calibration alone explains the others.
     restricted : bool
         Whether only some effects were considered: then what these leave is expected, and does not count
         against those that close a part of the gap on sealed trials.
@@ -46,13 +42,6 @@ def judge(
     p = null.detection.p_value
     if p >= settings.detected:
         return _no_gap(gap, p, settings)
-    if at_odds:
-        who = (
-            f"trial {at_odds[0]} contradicts"
-            if len(at_odds) == 1
-            else f"trials {', '.join(at_odds)} contradict"
-        )
-        return Verdict(UNKNOWN, f"{who} the others, which calibration alone explains: look there first")
     if selection is None or not selection.best.candidates:
         if gap is not None and negligible(gap, settings):
             return Verdict(NO_GAP, _small(gap))

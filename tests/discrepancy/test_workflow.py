@@ -97,7 +97,7 @@ def test_a_late_valve_cannot_be_told_from_an_early_clock(tmp_path, capsys):
 
 
 @pytest.mark.slow
-def test_a_mislabelled_trial_is_pointed_out_and_names_nothing(tmp_path, capsys):
+def test_a_mislabelled_trial_is_set_aside_by_name(tmp_path, capsys):
     folder, _ = lab(tmp_path / "set")
     table = (folder / "trials.csv").read_text().splitlines()
     header = table[0].split(",")
@@ -107,8 +107,9 @@ def test_a_mislabelled_trial_is_pointed_out_and_names_nothing(tmp_path, capsys):
     lines = [table[0], *(",".join(row[k] for k in header) for row in rows)]
     (folder / "trials.csv").write_text("\n".join(lines) + "\n")
     _, said = ask(discrepancy, folder, capsys, "--seed", "1", out=tmp_path / "out2")
-    assert said["verdict"] == "unknown"
-    assert wrong["trial"] in said["why"] and "contradicts" in said["why"]
+    assert said["verdict"] == "no_gap"
+    (aside,) = said["set_aside"]
+    assert aside["trial"] == wrong["trial"] and "notebook" in aside["reason"]
     assert said["effects"] == []
 
 
