@@ -23,6 +23,9 @@ TIMES_S, SHARES = (0.05, 0.2, 0.8), (0.02, 0.15)
 FIRST_STEPS = (0.03, 0.4, 0.8)  # of the search for the maximum, in the logarithms of both deviations and time
 # drop of the deviance from which on noise counts as correlated: by chance once in some thousand sets
 CLEARLY = 12.0
+# What is larger is a body that moves otherwise than the model, far from the fit: white noise known from the
+# tracks does not grow, and no camera is off by more than its white noise twice over, or a millimetre.
+WHITER, MOST_WHITE, MOST_M = 1.3, 2.0, 1e-3
 
 
 def coloured(noise: Noise, trials: Sequence[Trial], residuals: Sequence[np.ndarray]) -> Noise:
@@ -54,6 +57,8 @@ def coloured(noise: Noise, trials: Sequence[Trial], residuals: Sequence[np.ndarr
     options = {"xatol": 0.02, "fatol": 0.2, "maxfev": 120, "initial_simplex": simplex}
     best = minimize(of, start, method="Nelder-Mead", options=options)
     white, walk, time = np.exp(best.x)
+    if white > WHITER * noise.white_sd_m or walk > max(MOST_WHITE * noise.white_sd_m, MOST_M):
+        return noise
     return replace(noise, white_sd_m=float(white), correlated_sd_m=float(walk), correlation_s=float(time))
 
 
