@@ -1,0 +1,86 @@
+"""What is in no list, described by a term of the grammar; and where a gap is said to be."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from srs_opt.calibrate.candidates import Candidate, fitted_coordinates
+from srs_opt.calibrate.experiment import Experiment
+from srs_opt.calibrate.forms import Form
+from srs_opt.calibrate.model import Model
+from srs_opt.calibrate.noise import noise_of
+from srs_opt.discrepancy import describe
+from srs_opt.discrepancy.describe import describe_gap, terms_of
+from srs_opt.discrepancy.locate import stages
+from srs_opt.discrepancy.search import Search
+from srs_opt.discrepancy.split import split_trials
+from srs_opt.measurement.dataset import load_dataset
+from srs_opt.model.effects import generic_effects
+from virtual_lab.dataset import Recording, write_dataset
+from virtual_lab.trials import small_design
+from virtual_lab.truth import Truth
+
+FEW = ("generic_along_link", "generic_across_body", "generic_load_link")  # compiled in seconds
+
+
+@pytest.fixture
+def few_terms(monkeypatch):
+    few = {name: generic_effects()[name] for name in FEW}
+    for module in ("srs_opt.calibrate.model", "srs_opt.discrepancy.describe"):
+        monkeypatch.setattr(f"{module}.generic_effects", lambda: few)
+
+
+def describe_set(folder, unlisted, trials=8):
+    truth = Truth(unlisted=unlisted)
+    design = small_design(np.random.default_rng(1), 1.5)[:trials]
+    write_dataset(folder, truth, design, 3, Recording(rate_hz=40.0))
+    dataset = load_dataset(folder)
+    split = split_trials(dataset.trials)
+    experiment = Experiment(Model(dataset.robot), dataset.trials, noise_of(dataset), dataset.bench)
+    search = Search(experiment, fitted_coordinates(dataset.robot), (), split.open)
+    null = search.calibrate()
+    return null, describe_gap(search, null, null, split.sealed)
+
+
+def test_a_wheel_that_rolls_hard_is_described_with_its_link(tmp_path, few_terms):
+    null, found = describe_set(tmp_path / "set", ({"name": "stiff_wheel", "excess": 5.0, "link": 2},))
+    assert null.fit.misfit_ratio > 2
+    assert found.best.label == "generic_along_link[2]"
+    assert not found.why_not
+    value = found.best.fit.point.values["generic_along_link.excess[2]"]
+    assert abs(value - 5.0) < 4 * found.best.fit.sd["generic_along_link.excess[2]"]
+    assert found.sentence.startswith("link 2 rolls ")
+    assert found.sentence.endswith(" times as hard as the others")
+    assert found.gap.ratio < 0.1
+
+
+def test_nothing_is_described_where_nothing_is_missing(tmp_path, few_terms):
+    _, found = describe_set(tmp_path / "set", (), trials=4)
+    assert "chance" in found.why_not
+
+
+def test_terms_stand_at_every_place_but_where_the_robot_has_them():
+    labels = {c.label for c in terms_of(5, ["generic_along_link[2]"])}
+    assert {"generic_along_link[1]", "generic_gain_segment[4]", "generic_moment"} <= labels
+    assert not {"generic_along_link[2]", "generic_gain_segment[5]"} & labels
+    assert describe.DEFAULT.refits < len(labels)
+
+
+def fitted(misfit, *candidates):
+    fit = SimpleNamespace(misfit_ratio=misfit)
+    return SimpleNamespace(fit=fit, candidates=candidates, deviance=1000 * misfit, parameters=len(candidates))
+
+
+def test_located_is_what_closes_the_gap_when_fitted():
+    effects = generic_effects()
+    rolling = Candidate(Form(effects["generic_along_link"], 2))
+    soaking, lens = (
+        Candidate(Form(effects["generic_moment"])),
+        Candidate(Form(effects["generic_camera_lens"])),
+    )
+    null = fitted(5.0)
+    said = stages(null, [null, fitted(1.1, rolling), fitted(4.0, soaking), fitted(2.5, lens)])
+    assert [p.where for p in said] == ["curvature to motion (ground), link 2", "camera"]
+    assert said[0].score == pytest.approx(3900)
+    assert not stages(null, [fitted(4.0, soaking)])
