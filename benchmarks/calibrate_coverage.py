@@ -6,15 +6,17 @@ Small sets from the virtual laboratory, nothing hidden; its friction is smoothed
 friction and curvature scatter from trial to trial, bench values are off and the noise is misstated. Per
 parameter: how often the 90 % interval holds the true value, with the 99 % Clopper-Pearson interval of that
 rate; fails (exit status 1) where the latter excludes 90 %. Also mean and spread of (estimate - truth)/sd,
-which should be 0 and 1, and by how much the fit narrows the bench's deviation.
+which should be 0 and 1, and by how much the fit narrows the bench's deviation. ``--camera`` adds what real
+cameras add: noise correlated in time, drift, outliers, an error that repeats with the gait.
 """
 
 from __future__ import annotations
 
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
@@ -25,10 +27,22 @@ from benchmarks.stored import gather, stored_rows, study_parser
 LEVEL, WIDTH = 0.90, 1.6449
 TRIALS, SECONDS = 8, 3.0
 COLUMNS = ("parameter", "90 % interval holds the truth", "99 % interval of that rate", "90 % inside")
+CAMERA = {
+    "correlated_sd_m": 3e-4,
+    "correlation_s": 0.2,
+    "drift_m": 5e-4,
+    "outlier_share": 0.005,
+    "systematic_sd_m": 1e-4,
+}
 Row = dict[str, tuple[float, float]]
 
 
-def pulls(seed: int) -> Row:
+def camera_pulls(seed: int) -> Row:
+    """Return what `pulls` does, of a set as a real camera records it."""
+    return pulls(seed, CAMERA)
+
+
+def pulls(seed: int, camera: Mapping[str, float] = MappingProxyType({})) -> Row:
     """Return (estimate - truth)/sd and sd over the bench's sd, per parameter, for one generated set."""
     from srs_opt.calibrate.coordinates import ASSUMED_SD
     from srs_opt.calibrate.run import calibrate
@@ -43,7 +57,7 @@ def pulls(seed: int) -> Row:
     design = small_design(np.random.default_rng([seed, 5]), SECONDS)[:TRIALS]
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch) / "set"
-        write_dataset(folder, truth, design, seed, Recording(stated_sd_m=stated))
+        write_dataset(folder, truth, design, seed, Recording(stated_sd_m=stated, **camera))
         dataset = load_dataset(folder)
         found = calibrate(dataset)
     bench = {**ASSUMED_SD, **dataset.robot.relative_sd}
@@ -97,8 +111,13 @@ def run(quick: bool) -> Section:
 
 def main(argv: list[str] | None = None) -> int:
     """Run the study and print the coverage of every parameter."""
-    options = study_parser("calibrate_coverage", __doc__, 200).parse_args(argv)
-    lines, good = table(gather("calibrate_coverage", pulls, seeds(options.sets, options.seed), options))
+    parser = study_parser("calibrate_coverage", __doc__, 200)
+    parser.add_argument("--camera", action="store_true", help="noise as real cameras have it")
+    options = parser.parse_args(argv)
+    if options.camera and options.rows == parser.get_default("rows"):
+        options.rows = options.rows.with_name("calibrate_camera.jsonl")
+    name, work = ("calibrate_camera", camera_pulls) if options.camera else ("calibrate_coverage", pulls)
+    lines, good = table(gather(name, work, seeds(options.sets, options.seed), options))
     for name, hits, span, inside, spread, narrowed in lines:
         print(f"{name:34s} {hits}  [{span}]  {inside:3s}  {spread}  {narrowed}")
     return 0 if good else 1
