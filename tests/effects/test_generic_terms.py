@@ -6,6 +6,8 @@ import pytest
 
 from srs_opt.calibrate.forms import forms_of
 from srs_opt.calibrate.model import Conditions, Model
+from srs_opt.gait import Wave
+from srs_opt.gait_opt.collocation.point import PointKind, _linear_curvature, _Symbols
 from srs_opt.model.effects import all_effects, generic_effects, known_effects
 from srs_opt.model.effects.generic import TERMS
 from srs_opt.model.effects.parameter import Component
@@ -104,3 +106,28 @@ def test_a_wheel_that_rolls_hard_is_as_good_as_a_coefficient_of_its_own():
     entries = [{"name": "generic_along_link", "excess": 1.0, "link": k} for k in range(1, 6)]
     twice = wpi_srs().with_values(friction_tangential=2 * wpi_srs().friction_tangential)
     assert rate_of(robot_with(*entries)) == pytest.approx(rate_of(twice), rel=1e-12)
+
+
+@pytest.mark.parametrize("name", ["generic_gain_neighbours", "generic_gain_side", "generic_gain_segment"])
+def test_the_closed_form_of_gait_optimization_is_the_actuators_cycle(name):
+    robot, gait = robot_with(entry_of(name)), Wave.uniform(4, 2.0, 50.0, 1.1, 0.2).gait()
+    structure = Structure.of(robot)
+    parameters, _, actuator = build(structure)
+    kind = PointKind(structure)
+    s = _Symbols.of(kind)
+    kappa, rate, _ = _linear_curvature(kind, s)
+    closed = ca.Function("closed", [s.at, s.switches, s.half_width, parameters.vector], [kappa, rate])
+    p = parameters.pack(robot, gait.pressure_kpa, 1 / gait.period_s)
+    on, off = np.array([pairs[0] for pairs in gait.intervals]).T / gait.period_s
+    off = np.where(off < on, off + 1, off)
+    found = closed(0.0, np.ravel(np.column_stack([on, off])), 1e-4, p)
+    act, valve, time = ca.SX.sym("act", actuator.states), ca.SX.sym("valve", 4), ca.SX.sym("time")
+    after = actuator.advance(actuator.unstack(act), valve, time).vector()
+    step = ca.Function("step", [act, valve, time, parameters.vector], [after])
+    state = np.zeros(actuator.states)
+    durations, valves = gait.phases()
+    for _ in range(30):
+        for duration, held in zip(durations, valves.T):
+            state = step(state, held, duration, p)
+    expected = np.asarray(state).ravel()
+    assert np.asarray(found[0]).ravel() == pytest.approx(expected[:4], abs=2e-3)

@@ -161,6 +161,12 @@ def _linear_curvature(kind: PointKind, s: _Symbols) -> tuple[ca.SX, ca.SX, ca.SX
     parameters, _, actuator = build(kind.structure)
     ones = ca.SX.ones(kind.segments, 1)
     high, low = actuator.target(ones), actuator.target(-ones)
+    command = ca.SX.sym("command", kind.segments)
+    by_command = ca.substitute(ca.jacobian(actuator.target(command), command), command, 0 * ones)
+    coupled = not ca.SX(by_command).sparsity().is_diag()  # segments that also follow others' valves
+    middle = (high + low) / 2
+    if coupled:  # the actuators are linear: what each valve does adds up
+        high, low = ones, -ones
     k = kind.intervals
     columns = []
     for i in range(kind.segments):
@@ -169,6 +175,8 @@ def _linear_curvature(kind: PointKind, s: _Symbols) -> tuple[ca.SX, ca.SX, ca.SX
         turns = s.turns[mine] if kind.ordered else None
         columns.append(periodic_curvature(parameters, high[i], low[i], s.at, pair, s.half_width, turns))
     kappa, rate, valve = (ca.vertcat(*[c[j] for c in columns]) for j in range(3))
+    if coupled:
+        kappa, rate = middle + by_command @ kappa, by_command @ rate
     return kappa, rate, valve
 
 
