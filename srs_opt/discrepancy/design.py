@@ -94,11 +94,12 @@ def next_experiment(
         f"{what} ({quantity})": _instrument_gain(expected[quantity], sd, first, second)
         for quantity, (what, sd) in INSTRUMENTS.items()
     }
-    new = proposals(experiment, trials)
-    both = [_trial_gains(experiment, a, b, new) for a, b in ((first, second), (second, first))]
-    options |= {what: min(gains[what] for gains in both) for what in new}
     direct = [f"{INSTRUMENTS[q][0]} ({q})" for q in _own_instruments(first, second)]
     sure = {what: options[what] for what in direct if power(options[what]) > SURE}
+    if not sure:  # trials cost a simulation each
+        new = proposals(experiment, trials)
+        both = [_trial_gains(experiment, a, b, new) for a, b in ((first, second), (second, first))]
+        options |= {what: min(gains[what] for gains in both) for what in new}
     what, gain = max((sure or options).items(), key=lambda item: item[1])
     names = tuple(" + ".join(h.names) or NOTHING for h in rivals)
     return NextExperiment(what, names, round(power(gain), 3))
