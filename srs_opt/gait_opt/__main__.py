@@ -82,6 +82,11 @@ def build_parser() -> Parser:
         help="one gait for all of these bending stiffnesses, N m^2 (for example 0.002 0.005 0.02)",
     )  # fmt: skip
     how.add_argument(
+        "--spread", type=positive_float, metavar="SHARE",
+        help="for actuators too whose curvature per pressure or time constants are off by this share (0.1), "
+        "on the softest and the stiffest body",
+    )  # fmt: skip
+    how.add_argument(
         "--worst", choices=("relative", "absolute"),
         help="which of several robots counts: the slowest beside its published gait (default where speed is "
         "wanted), or the slowest",
@@ -134,7 +139,7 @@ def problem_from(options: argparse.Namespace) -> CycleProblem:
     from srs_opt.gait_opt.collocation.problem import CycleProblem
     from srs_opt.gait_opt.collocation.solver import Solver
     from srs_opt.gait_opt.goal import Goal
-    from srs_opt.gait_opt.robust import relative
+    from srs_opt.gait_opt.robust import relative, spread
     from srs_opt.robot import load_robot
 
     robots: list[Robot] = [load_robot(path) for path in options.robots or [options.robot]]
@@ -145,6 +150,10 @@ def problem_from(options: argparse.Namespace) -> CycleProblem:
         options.least_speed, options.side,
     )  # fmt: skip
     robots = softened(options, robots)
+    if options.spread:
+        if options.spread >= 1:
+            raise InputError(f"--spread must be below 1, found {options.spread:g}")
+        robots = spread(robots, options.spread)
     if options.intervals > 1 and options.valves != "free":
         raise InputError("--intervals goes with --valves free: a wave has one interval per segment and cycle")
     if options.intervals > MOST_INTERVALS:
@@ -226,7 +235,7 @@ def run(options: argparse.Namespace) -> Answer:
     from srs_opt.simulate import compiled
 
     problem = problem_from(options)
-    if len(problem.robots) > 1 and not options.robots and not options.stiffness:
+    if len(problem.robots) > 1 and not (options.robots or options.stiffness or options.spread):
         say(
             options,
             f"note: robot '{problem.robots[0].name}' gives its stiffness with a deviation: one gait for two "
@@ -284,6 +293,8 @@ def _run_table(options: argparse.Namespace) -> Answer:
 
     if options.worst and not (options.stiffness or options.robots):
         raise InputError("--worst says which of several robots counts: give --stiffness or --robots with it")
+    if options.spread:
+        raise InputError("--spread goes with one robust gait, not with --table")
     if options.warm and (options.stiffness or options.robots):
         raise InputError("--table --warm moves one robot's table: without --stiffness and --robots")
     import shutil

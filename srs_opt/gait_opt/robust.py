@@ -35,6 +35,28 @@ def stiffness_interval(robot: Robot) -> tuple[Robot, ...]:
     return robot, of_stiffness(robot, ei / reach), of_stiffness(robot, ei * reach)
 
 
+SPREAD = {
+    "curvature per pressure": ("curvature_per_pressure_1_m_kpa",),
+    "time constants": ("tau1_s", "tau2_s"),
+}
+
+
+def spread(robots: Sequence[Robot], share: float) -> list[Robot]:
+    """Return the robots, then the softest and the stiffest with other actuators.
+
+    Curvature per pressure and both time constants are `share` below and above; a robust gait for stiffnesses
+    alone loses most where these are off on a body at an end of the range.
+    """
+    order = sorted(robots, key=lambda robot: robot.bending_stiffness_n_m2 or math.inf)
+    found = list(robots)
+    for robot in order[:: len(order) - 1] if len(order) > 1 else order:
+        for what, names in SPREAD.items():
+            for factor in (1 - share, 1 + share):
+                values = {name: factor * getattr(robot, name) for name in names}
+                found.append(robot.with_values(name=f"{robot.name}, {what} x {factor:g}", **values))
+    return found
+
+
 def in_the_middle(robots: Sequence[Robot]) -> tuple[Robot, ...]:
     """Return robots that differ in stiffness, the middle one first, its deviation covering the others."""
     order = sorted(robots, key=lambda robot: robot.bending_stiffness_n_m2 or math.inf)

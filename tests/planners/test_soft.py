@@ -12,6 +12,8 @@ from srs_opt.gait_opt.replayed import replayed
 from srs_opt.robot import wpi_srs
 from srs_opt.simulate.integrate import Integrator
 from srs_opt.simulate.timeline import Timeline
+from virtual_lab.live import LiveRobot
+from virtual_lab.truth import Parameters, Truth
 
 
 def soft(stiffness):
@@ -44,6 +46,26 @@ def test_a_plan_is_the_motion_of_the_soft_body(soft_problem):
     for time, pose in zip(plan.certificate.time_s[::50], plan.certificate.pose[::50]):
         place, _ = path.at(np.array([time]))
         np.testing.assert_allclose(pose, place[0], atol=2e-3)
+
+
+def test_a_plan_played_open_loop_on_the_laboratorys_soft_body_ends_where_it_should(soft_problem):
+    """Another formulation plays the valves; nobody steers."""
+    plan = solve_with_lattice(soft_problem).plan
+    start, certificate = soft_problem.start, plan.certificate
+    truth = Truth(Parameters(bending_stiffness_n_m2=0.005), friction_speed_m_s=0.002)
+    robot = LiveRobot(truth, start.x, start.y, start.heading)
+    off = []
+    for before, k in zip((soft_problem.motion.rest, *plan.gaits), plan.gaits):
+        line = soft_problem.joints.timeline(before, k)
+        for duration, valves, pressure in zip(line.duration_s, line.valve.T, line.pressure_kpa):
+            robot.advance(valves, float(pressure), float(duration))
+        if robot.time_s > certificate.time_s[-1]:  # arrived within this cycle
+            break
+        centre = robot.look().centre_of_mass()[0]
+        planned = [np.interp(robot.time_s, certificate.time_s, c) for c in certificate.pose[:, :2].T]
+        off.append(float(np.hypot(*(centre - planned))))
+    assert len(off) >= len(plan.gaits) - 1
+    assert max(off) < 1e-4 < certificate.clearance_m
 
 
 def test_a_soft_robot_drives_its_plan(soft_problem):

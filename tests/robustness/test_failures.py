@@ -169,6 +169,8 @@ CASES = [
     ("srs_opt.gait_opt", ["--stiffness", "0.005", "--model", "complex"], 2, "--model compliant"),
     ("srs_opt.gait_opt", ["--stiffness", "0.005", "--table", "--warm", "x.json"], 2, "--table --warm"),
     ("srs_opt.gait_opt", ["--worst", "relative", "--table"], 2, "--worst"),
+    ("srs_opt.gait_opt", ["--spread", "1.5"], 2, "--spread must be below 1"),
+    ("srs_opt.gait_opt", ["--spread", "0.1", "--table"], 2, "not with --table"),
     ("srs_opt.gait_opt", ["--worst", "relative", "--objective", "transport"], 2, "--worst relative"),
     ("srs_opt.calibrate", ["{tmp}/absent"], 2, "absent"),
     ("srs_opt.calibrate", ["{tmp}/set"], 2, "dataset.yaml"),
