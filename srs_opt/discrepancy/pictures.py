@@ -45,11 +45,11 @@ def gap_picture(found: Discrepancy) -> Picture | None:
     measured = track.reshape(len(track), -1, 2)
     for residual, label, colour in zip(residuals, ("calibration alone", "with the effect"), (BEFORE, AFTER)):
         points = 1e3 * (track - residual).reshape(len(track), -1, 2)
-        room.plot(*np.nanmean(points, axis=1).T, color=colour, lw=0.8, alpha=0.6)
+        room.plot(*middle(points).T, color=colour, lw=0.8, alpha=0.6)
         room.plot(*points[last].T, "-", color=colour, lw=2.0, label=label)
         course.plot(trial.time_s, 1e3 * _rolling(residual), color=colour, label=label)
     room.plot(*(1e3 * measured[last]).T, "o", mfc="none", color="k", ms=4, label="measured")
-    room.plot(*(1e3 * np.nanmean(measured, axis=1)).T, color="k", lw=0.8, ls=":")
+    room.plot(*(1e3 * middle(measured)).T, color="k", lw=0.8, ls=":")
     room.set_aspect("equal", adjustable="datalim")
     room.set_xlabel("x (mm)")
     room.set_ylabel("y (mm)")
@@ -66,6 +66,12 @@ def gap_picture(found: Discrepancy) -> Picture | None:
         "predicted with and without the effect (thin: the way of the markers' mean). Right: root mean square "
         "distance per coordinate over a fifth of a second.",
     )
+
+
+def middle(points: np.ndarray) -> np.ndarray:
+    """Return the mean of the seen markers (T, 2); NaN where none was seen."""
+    seen = np.isfinite(points[..., :1]).sum(axis=1)
+    return np.asarray(np.nansum(points, axis=1) / np.where(seen > 0, seen, np.nan))
 
 
 def _figure(width: float, height: float) -> Figure:

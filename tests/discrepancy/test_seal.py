@@ -8,6 +8,7 @@ import pytest
 from srs_opt.calibrate.noise import Noise
 from srs_opt.discrepancy import seal
 from srs_opt.discrepancy.motions import motion_errors
+from srs_opt.discrepancy.pictures import middle
 from srs_opt.discrepancy.verdict import negligible
 from srs_opt.measurement.records import Trial
 
@@ -92,3 +93,12 @@ def test_one_sealed_trial_far_off_is_set_aside_and_three_are_not():
     assert name == "b"
     assert not seal.odd_sealed(gap(a=0.09, b=0.08, c=2e-4))
     assert not seal.odd_sealed(gap(a=1e-4, b=5e-4, c=2e-4))
+
+
+def test_frames_in_which_no_marker_was_seen_have_no_middle():
+    points = steady(np.arange(3) / 10)
+    points[1] = np.nan
+    points[2, 0] = np.nan
+    found = middle(points)
+    assert np.isnan(found[1]).all()
+    np.testing.assert_allclose(found[2], points[2, 1:].mean(axis=0))
