@@ -23,7 +23,7 @@ pilot: venv
 	$(PY) -c "from srs_opt.gait_opt.catalogue import default_table; from srs_opt.robot import wpi_srs; \
 	from srs_opt.controller.program import Program; from srs_opt.controller.c_source import write_program; \
 	from pathlib import Path; \
-	write_program(Program.of_table(default_table(wpi_srs()), 1e-3), Path('out/pilot/gait_table.h'))"
+	write_program(Program.of_table(default_table(wpi_srs(), driver=True), 1e-3), Path('out/pilot/gait_table.h'))"
 	$(PY) -m virtual_lab.robot --program out/pilot/gait_table.h --start 0.2,1.024,0 --link out/pilot/valves \
 	  --effect tether_drag --duration 90 & \
 	sleep 5; $(PY) -m planners.pilot mazes/first.yaml --valves out/pilot/valves --pose udp://127.0.0.1:5005 \

@@ -124,7 +124,7 @@ def _points(sizes: list[int]) -> dict[str, Curve]:
 
 def _area(cells: list[int]) -> dict[str, Curve]:
     """Mazes of more and more cells of 0.3 m: wall distances, then the way to the goal from everywhere."""
-    robot, gaits = wpi_srs(), shipped_table()
+    robot, gaits = wpi_srs(), shipped_table().for_planning()
     area, tables, ways = [], [], []
     for size in cells:
         maze = _maze(size)

@@ -55,11 +55,12 @@ def build_parser() -> Parser:
 
 def run(options: argparse.Namespace) -> Answer:
     """Plan, connect, drive, write."""
+    from planners.motion.valves import playable
     from planners.pilot.hardware import MachineClock, open_port
     from planners.pilot.page import LivePage
     from planners.pilot.session import pilot
     from planners.pilot.sources import open_source
-    from planners.plan.inputs import problem_from
+    from planners.plan.inputs import gaits_from, problem_from, valve_limits
     from planners.plan.portfolio import Wish, solve
     from srs_opt.controller.program import Program
 
@@ -73,7 +74,9 @@ def run(options: argparse.Namespace) -> Answer:
         record = result.to_record(problem)
         if result.plan is None:
             return Answer(record, f"{result.status}: {result.reason}", False)
-        program = Program.of_table(problem.gaits, options.tick)
+        # the header that is flashed has the driver's gaits too, behind those of the plan
+        table = playable(problem.robot, gaits_from(options, problem.robot), valve_limits(options))
+        program = Program.of_table(table, options.tick)
         with LivePage.serve(options.page, problem, result.plan, lambda text: say(options, text)) as page:
             driven = pilot(
                 problem,

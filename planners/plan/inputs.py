@@ -67,6 +67,7 @@ def planning_problem(
 
     check_margin(robot, margin_m)
     check_placement(maze, RobotSize(robot.length_m, robot.body_width_m / 2, margin_m))
+    table = table.for_planning()
     gaits = playable(robot, table, valves)
     if len(gaits.gaits) < len(table.gaits):
         tell(f"note: {len(gaits.gaits)} of {len(table.gaits)} gaits keep the valves' limits")
@@ -94,18 +95,22 @@ def problem_from(options: argparse.Namespace) -> Problem:
     robot = load_robot(options.robot)
     check_margin(robot, options.margin)
     maze = maze_from(options, robot)
-    limits = ValveLimits(options.min_dwell, options.tick, options.pressure_rate)
     return planning_problem(
         robot,
         maze,
         gaits_from(options, robot),
         margin_m=options.margin,
-        valves=limits,
+        valves=valve_limits(options),
         drive=None if options.drive is None else load_calibration(options.drive),
         cost=options.cost,
         tell=lambda text: say(options, text),
         show=lambda rows: progress(rows, options, "changes of gait (once per gait table)"),
     )
+
+
+def valve_limits(options: argparse.Namespace) -> ValveLimits:
+    """Return what the valves' options say."""
+    return ValveLimits(options.min_dwell, options.tick, options.pressure_rate)
 
 
 def maze_from(options: argparse.Namespace, robot: Robot) -> Maze:
@@ -127,7 +132,10 @@ def maze_from(options: argparse.Namespace, robot: Robot) -> Maze:
 
 
 def gaits_from(options: argparse.Namespace, robot: Robot) -> GaitTable:
-    """Return the gait table: that of --gaits, else the one built for this robot (built now if need be)."""
+    """Return the gait table: that of --gaits, else the one built for this robot (built now if need be).
+
+    With the gaits for drivers, of which planners make no use (`GaitTable.for_planning`).
+    """
     return gaits_for(robot, options.gaits, chosen_model(options, robot), lambda text: say(options, text))
 
 
@@ -146,4 +154,4 @@ def gaits_for(
             f"note: robot '{robot.name}' gives no bending stiffness: rigid actuators assumed; a body that "
             "bends moves otherwise (measure it, or gait_opt --table --stiffness EI...)"
         )
-    return default_table(robot, model or robot.own_model, say=tell)
+    return default_table(robot, model or robot.own_model, say=tell, driver=True)

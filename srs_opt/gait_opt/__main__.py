@@ -335,7 +335,9 @@ def _run_table(options: argparse.Namespace) -> Answer:
             worst = options.worst or "relative"
             table = robust_table(robots, model, basis, limits, worst, partial(say, options), **where)
         else:
-            table = build_table(robot, model, limits, partial(say, options), resume=unfinished, **where)
+            table = build_table(
+                robot, model, limits, partial(say, options), resume=unfinished, driver=True, **where
+            )
     except KeyboardInterrupt:
         kept = len(list(unfinished.glob("*.json")))
         say(options, f"\n{kept} optimizations are kept in {unfinished}; the same command goes on from there")

@@ -28,7 +28,11 @@ def cached_table_path(robot: Robot, model: str = "complex") -> Path:
 
 
 def default_table(
-    robot: Robot, model: str = "complex", say: Callable[[str], None] | None = None
+    robot: Robot,
+    model: str = "complex",
+    say: Callable[[str], None] | None = None,
+    *,
+    driver: bool = False,
 ) -> GaitTable:
     """Return the gait table of `robot`: shipped with the package, built before, or built now.
 
@@ -36,7 +40,15 @@ def default_table(
     ----------
     say : callable, optional
         Told about progress while a table is built (one to two minutes).
+    driver : bool
+        With the slow gaits and pivots at its end that a driver needs and planners do not use. They are there
+        where the table was shipped or made by ``gait_opt --table``.
     """
+    table = _whole_table(robot, model, say)
+    return table if driver else table.for_planning()
+
+
+def _whole_table(robot: Robot, model: str, say: Callable[[str], None] | None) -> GaitTable:
     if model == "complex" and robot.fingerprint() == wpi_srs().fingerprint():
         return shipped_table()
     path = cached_table_path(robot, model)
@@ -47,7 +59,7 @@ def default_table(
             path.unlink(missing_ok=True)
     if model == "compliant":
         rigid = robot.with_values(bending_stiffness_n_m2=None, gap_stiffness_n_m2=None)
-        table = replayed(robot, default_table(rigid, say=say), model)
+        table = replayed(robot, _whole_table(rigid, "complex", say), model)
     else:
         from srs_opt.gait_opt.family import build_table
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -16,13 +17,13 @@ from srs_opt.gait_opt.finish import finished
 from srs_opt.gait_opt.goal import STRAIGHT_RAD_S, Goal, Limits
 from srs_opt.gait_opt.objectives.cycle import GaitCycle
 from srs_opt.gait_opt.objectives.objective import Objective
-from srs_opt.gait_opt.table import EntryCertificate, GaitTable, TableGait
+from srs_opt.gait_opt.switch_times import collocated_speeds
+from srs_opt.gait_opt.table import LEVER_M, EntryCertificate, GaitTable, TableGait
 from srs_opt.parallel import executor
 from srs_opt.parallel.sweep import sweep
 from srs_opt.robot import Robot
 
 Say = Callable[[str], None]
-_LEVER_M = 0.1  # weighs turn rates against speeds, as `GaitTable.nearest`
 _BAND_WEIGHT = 2.0  # m/s per metre of band: 5 mm wider is as bad as 1 cm/s off
 
 # What a table says of a gait is its motion: whether that is what was wished for is decided before.
@@ -83,7 +84,14 @@ def _certificate(work: _Work, entry: TableGait) -> tuple[TableGait | None, str]:
     """Return the entry with its certificate and "", or None and what failed."""
     problem = CycleProblem((work.robot,), work.model, Goal(_ANY_MOTION), work.limits)
     try:
-        certificate, (orbit,) = certify(problem, entry.gait, (entry.speed_m_s,))
+        # what the certificate's simulation has to confirm: it must come from elsewhere
+        claimed = collocated_speeds(problem, entry.gait)
+        if claimed is None:
+            return None, "collocation does not find its motion"
+        if entry.radius_m is not None and abs(entry.radius_m) < work.robot.body_width_m / 2:
+            # it turns on the spot: whether its path runs ahead or back depends on hairs
+            claimed = tuple(math.copysign(speed, entry.speed_m_s) for speed in claimed)
+        certificate, (orbit,) = certify(problem, entry.gait, claimed)
     except NoAnswerError as error:
         return None, str(error)
     if not certificate.passed:
@@ -91,6 +99,7 @@ def _certificate(work: _Work, entry: TableGait) -> tuple[TableGait | None, str]:
     found = certificate.robots[0]
     clearance = self_clearance_m(work.robot, orbit, work.model)
     kept = EntryCertificate(
+        found.relative_error,
         found.periodicity_gap,
         found.largest_floquet_multiplier,
         found.standing_start_m_s,
@@ -116,7 +125,9 @@ def _on_ticks(work: _Work, entry: TableGait) -> tuple[TableGait | None, str]:
         (orbit,) = certify(problem, near, (entry.speed_m_s,))[1]
     except NoAnswerError as error:
         return None, str(error)
-    return _certificate(replace(work, limits=wide), TableGait.of_orbit(entry.name, orbit))
+    return _certificate(
+        replace(work, limits=wide), replace(TableGait.of_orbit(entry.name, orbit), planned=entry.planned)
+    )
 
 
 def _likeness(entry: TableGait) -> Callable[[GaitCycle], ca.SX]:
@@ -125,7 +136,7 @@ def _likeness(entry: TableGait) -> Callable[[GaitCycle], ca.SX]:
 
     def merit(cycle: GaitCycle) -> ca.SX:
         wider = ca.fmax(cycle.band_m - band, 0)
-        off = ca.hypot(cycle.speed_m_s - speed, _LEVER_M * (cycle.turn_rate_rad_s - turn))
+        off = ca.hypot(cycle.speed_m_s - speed, LEVER_M * (cycle.turn_rate_rad_s - turn))
         return -off - _BAND_WEIGHT * wider
 
     return merit

@@ -12,6 +12,7 @@ from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait, published_wave
 from srs_opt.gait_opt.aim import end_for_end, in_step
 from srs_opt.gait_opt.collocation.problem import CycleProblem
+from srs_opt.gait_opt.driver import driver_gaits
 from srs_opt.gait_opt.entries import certified_table
 from srs_opt.gait_opt.finish import finished
 from srs_opt.gait_opt.goal import LEAST_SPEED_M_S, STRAIGHT_RAD_S, Goal, Limits
@@ -56,8 +57,11 @@ def build_table(
     jobs: int = 2,
     cluster: str | None = None,
     resume: Path | None = None,
+    driver: bool = False,
 ) -> GaitTable:
     """Return the table of `robot`: optimized left turns and straights, their images, all certified.
+
+    With `driver`, slow gaits and pivots follow, of which planners make no use.
 
     Wishes out of reach are left out, and said so. With the folder `resume`, gaits found there are not
     optimized again; it is left for the caller to remove.
@@ -86,9 +90,23 @@ def build_table(
     if not gaits:
         raise NoAnswerError(f"no gait of the table is within reach of robot '{robot.name}'")
     table = GaitTable(robot.name, robot.fingerprint(), model, gaits)
+    if driver:
+        table = with_driver_gaits(robot, table, work.limits, say, jobs=jobs)
     table = certified_table(robot, table, work.limits, say, jobs=jobs, cluster=cluster)
     say(f"{len(table.gaits)} gaits from {len(asked)} optimizations, all certified")
     return table
+
+
+def with_driver_gaits(
+    robot: Robot, table: GaitTable, limits: Limits, say: Callable[[str], None], *, jobs: int = 1
+) -> GaitTable:
+    """Return the table with slow gaits and pivots at its end, not yet certified."""
+
+    def imaged(name: str, gait: Gait) -> list[TableGait]:
+        return images(robot, table.model, name, gait, limits.tick_s)
+
+    slow = driver_gaits(robot, table.model, limits, imaged, say, jobs=jobs)
+    return replace(table, gaits=table.for_planning().gaits + slow)
 
 
 def _fulfilled(work: Work, tasks: Sequence[Task]) -> list[dict[str, Any]]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait_opt.table import GaitTable, TableGait
 from srs_opt.orbit.steady import steady_gaits
@@ -21,7 +23,7 @@ def replayed(robot: Robot, table: GaitTable, model: str | None = None, *, jobs: 
     model = model or robot.own_model
     orbits = steady_gaits(robot, [entry.gait for entry in table.gaits], model, jobs=jobs)
     gaits = tuple(
-        TableGait.of_orbit(entry.name, orbit)
+        replace(TableGait.of_orbit(entry.name, orbit), planned=entry.planned)
         for entry, orbit in zip(table.gaits, orbits)
         if not isinstance(orbit, NoAnswerError)
         and orbit.largest_multiplier < 1

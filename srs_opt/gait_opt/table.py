@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 VERSION = 1
 # Half the step between the table's speeds; half of it refuses what is nearly there, double plays what is not.
 NEAR_M_S = 0.05
+LEVER_M = 0.1  # turn rates weigh as speeds at this distance, half the built-in robot's length
 
 
 @dataclass(frozen=True)
@@ -32,11 +33,14 @@ class EntryCertificate:
 
     Attributes
     ----------
+    relative_error : float
+        Of the speed that direct collocation claims for the gait, beside the simulated one.
     periodicity_gap, largest_floquet_multiplier, standing_start_m_s : float
     self_clearance_m : float or None
         Least room between parts of the body that are not neighbours; None for a body too short to have any.
     """
 
+    relative_error: float
     periodicity_gap: float
     largest_floquet_multiplier: float
     standing_start_m_s: float
@@ -70,6 +74,8 @@ class TableGait:
         None where the motion is taken from the model without one.
     worst_speed_m_s : float, optional
         Of a table for several robots: the least of the speeds that they make, without sign.
+    planned : bool
+        Whether planners use it; slow gaits and pivots are for drivers only.
     """
 
     name: str
@@ -82,6 +88,7 @@ class TableGait:
     friction_work_j: float
     certificate: EntryCertificate | None = None
     worst_speed_m_s: float | None = None
+    planned: bool = True
 
     @property
     def settling_s(self) -> float | None:
@@ -116,6 +123,7 @@ class TableGait:
             "displacement": list(self.displacement),
             "friction_work_j": self.friction_work_j,
             **({} if self.worst_speed_m_s is None else {"worst_speed_m_s": self.worst_speed_m_s}),
+            **({} if self.planned else {"planned": False}),
             **({} if found is None else {"settling_s": self.settling_s, "certificate": dict(vars(found))}),
         }
 
@@ -135,12 +143,16 @@ class TableGait:
             record["friction_work_j"],
             EntryCertificate(**record["certificate"]) if "certificate" in record else None,
             record.get("worst_speed_m_s"),
+            record.get("planned", True),
         )
 
 
 @dataclass(frozen=True, repr=False)
 class GaitTable(Result):
-    """Gaits of one robot under one model; `fingerprint` is the robot's."""
+    """Gaits of one robot under one model; `fingerprint` is the robot's.
+
+    Those that planners do not use come last, so that an index means the same gait with and without them.
+    """
 
     robot_name: str
     fingerprint: str
@@ -153,11 +165,16 @@ class GaitTable(Result):
                 return gait
         raise KeyError(name)
 
+    def for_planning(self) -> GaitTable:
+        """Return the table without what only a driver wants."""
+        gaits = tuple(gait for gait in self.gaits if gait.planned)
+        return self if gaits == self.gaits else replace(self, gaits=gaits)
+
     def nearest(
         self,
         speed_m_s: float,
         turn_rate_rad_s: float,
-        lever_m: float = 0.1,
+        lever_m: float = LEVER_M,
         tolerance_m_s: float = NEAR_M_S,
     ) -> TableGait | None:
         """Return the gait nearest to a wanted motion; turn rates weigh `lever_m` against speeds.
@@ -214,6 +231,9 @@ def load_table(path: Path | str, robot: Robot | None = None) -> GaitTable:
             ("version",), f"this program reads version {VERSION}, found {record['version']!r}"
         )
     validate(document, load_schema("srs_opt.gait_opt", "gait_table.schema.json"))
+    used = [gait.get("planned", True) for gait in record["gaits"]]
+    if used != sorted(used, reverse=True) or not used[0]:
+        raise document.error(("gaits",), "gaits with 'planned: false' must come after all others")
     table = GaitTable(record["robot"], record["fingerprint"], record["model"], _entries(document))
     if robot is not None and table.fingerprint != robot.fingerprint():
         raise InputError(

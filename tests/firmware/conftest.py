@@ -12,7 +12,7 @@ needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="no C com
 
 @pytest.fixture(scope="session")
 def table():
-    return default_table(wpi_srs())
+    return default_table(wpi_srs(), driver=True)
 
 
 @pytest.fixture(scope="session")

@@ -85,9 +85,12 @@ def test_images_are_mirror_images(table):
     left = {g.name: g for g in table.gaits if g.name.endswith(" left") and "back" not in g.name}
     for name, entry in left.items():
         other = table[name.replace("left", "right")]
-        assert other.speed_m_s == pytest.approx(entry.speed_m_s, rel=1e-3)
+        if name.startswith("pivot"):  # on the spot, whether the path runs ahead or back depends on hairs
+            assert abs(other.speed_m_s) == pytest.approx(abs(entry.speed_m_s), abs=1e-5)
+        else:
+            assert other.speed_m_s == pytest.approx(entry.speed_m_s, rel=1e-3)
         assert other.turn_rate_rad_s == pytest.approx(-entry.turn_rate_rad_s, rel=2e-3)
-        assert other.envelope_m == pytest.approx(entry.envelope_m[::-1], rel=1e-2)
+        assert other.envelope_m == pytest.approx(entry.envelope_m[::-1], rel=1e-2, abs=1e-3)
 
 
 def test_default_table_of_the_built_in_robot(table):
@@ -140,7 +143,7 @@ def test_player_in_c_plays_every_tick(table, tmp_path):
     flags = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-I", str(tmp_path), "-I", str(FIRMWARE)]
     sources = [str(PLAYER), str(FIRMWARE / "srs_player.c")]
     subprocess.run(["cc", *flags, *sources, "-o", str(program)], check=True)
-    for entry in table.gaits[::9]:
+    for entry in [*table.gaits[::9], table["slow 0.02 back"], table["pivot 0.6 right"]]:
         speed, turn = round(1e3 * entry.speed_m_s), round(1e3 * entry.turn_rate_rad_s)
         schedule = Schedule.of_gait(entry.gait, TICK_S)
         ticks = 2 * schedule.period + 17
@@ -160,7 +163,7 @@ def test_player_in_c_plays_every_tick(table, tmp_path):
             for t in range(ticks)
         ]
         assert lines[:-1] == expected
-    for speed, turn in ((0, 0), (0, 6000), (20, 0), (9999, 0)):
+    for speed, turn in ((0, 0), (0, 6000), (0, 2000), (9999, 0)):
         done = subprocess.run([str(program), str(speed), str(turn), "30"], capture_output=True, text=True)
         assert "no gait is near" in done.stderr and set(done.stdout.split()) == {"----"}
         assert table.nearest(1e-3 * speed, 1e-3 * turn) is None

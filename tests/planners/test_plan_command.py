@@ -47,7 +47,7 @@ def test_narrow_needs_a_slim_gait(capsys, tmp_path):
     from srs_opt.robot import wpi_srs
 
     _, answer, _ = run(capsys, tmp_path, MAZES / "narrow.yaml")
-    table = gaits_from(build_parser().parse_args([str(MAZES / "narrow.yaml")]), wpi_srs())
+    table = gaits_from(build_parser().parse_args([str(MAZES / "narrow.yaml")]), wpi_srs()).for_planning()
     bands = {entry.name: sum(entry.envelope_m) for entry in table.gaits}
     used = [bands[step["gait"]] for step in answer["steps"]]
     free_m = 0.082 - 2 * 0.005  # the passage less the margins
