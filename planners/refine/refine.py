@@ -194,7 +194,8 @@ class _Refiner:
         (rows,) = solver.limits([shot])
         room = Values(rows.values[solver.limits.ends :], rows.slopes[solver.limits.ends :])
         window = on_ticks(shot.window, room, cycles, self.problem.joints.limits.tick_s)
-        _, spare = solver.order_rows(window, 0)
+        # what is not kept yet is put right by the next window; its dwell begins with what is kept
+        _, spare = solver.order_rows(window.first(cycles), 0)
         if spare.min() < -1e-9:
             raise NoAnswerError("valves could not play the refined cycles on their ticks")
         return window

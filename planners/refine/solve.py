@@ -159,19 +159,21 @@ class WindowSolver:
         low[ends:n] = np.clip(self.pressure_kpa[0] - kpa, -span, 0.0)
         high[ends:n] = np.clip(self.pressure_kpa[1] - kpa, 0.0, span)
         low[n:], high[n:] = 0.0, np.inf
-        found = linprog(
-            cost,
-            A_ub=sparse.vstack([near, order]).tocsr(),
-            b_ub=np.concatenate([values, np.maximum(room, -reach / 2)]),
-            bounds=np.column_stack([low, high]),
-            method="highs",
-        )
-        return None if found.x is None else by_cycles @ found.x[:n]
+        columns = np.column_stack([low, high])
+        rows_of_all = sparse.vstack([near, order]).tocsr()
+        # what a start breaks is put right, all at once where the reach allows for it
+        for mended in (-reach / 2, 0.0):
+            bounds = np.concatenate([values, np.maximum(room, mended)])
+            found = linprog(cost, A_ub=rows_of_all, b_ub=bounds, bounds=columns, method="highs")
+            if found.x is not None:
+                return np.asarray(by_cycles @ found.x[:n])
+        return None
 
     def order_rows(self, window: Window, ticks: int = 1) -> tuple[sparse.csr_matrix, Array]:
         """Return ``A x <= b`` for changes x: dwell, and every switch in its own cycle.
 
-        Every segment switches inside every cycle; `ticks` are kept for rounding.
+        Every segment switches inside every cycle. `ticks` are kept for rounding; with 0 of them the end is
+        open.
         """
         tick = self.valves.tick_s
         least = self.valves.dwell_s + ticks * tick
@@ -204,7 +206,7 @@ class WindowSolver:
                     time - begin - ((1 + ticks) * tick if last else 0.0),
                 )
                 row(ends + k, first + j, end - time - (1 + ticks) * tick)
-            if times and tail:
+            if times and tail and ticks:
                 row(
                     ends + window.cycles - 1,
                     first + len(times) - 1,

@@ -190,6 +190,22 @@ class Window:
         )
         return Timeline(np.diff(edges), valve, self.pressures(middles), np.ones(middles.size))
 
+    def first(self, cycles: int) -> Window:
+        """Return the first cycles alone."""
+        rows, owners = [], []
+        for row, mine in zip(self.rows, self.cycle_of):
+            count = sum(owner < cycles for owner in mine)
+            rows.append(ValveRow(row.states[: count + 1], row.times_s[:count]))
+            owners.append(mine[:count])
+        return Window(
+            tuple(rows),
+            tuple(owners),
+            self.ends_s[:cycles],
+            self.pressure_kpa[:cycles],
+            self.ramp_s[:cycles],
+            self.from_kpa,
+        )
+
     def cycle(self, k: int) -> Joint:
         """Return one of the cycles as valves and regulator play it."""
         begin = self.ends_s[k - 1] if k else 0.0
