@@ -29,7 +29,7 @@ def build_parser() -> Parser:
         "--refine",
         action="store_true",
         help="then optimize all valve switches, cycle times and pressures at once for less time; certified "
-        "afresh, the plan is kept where that fails (takes up to 5 s per second of plan)",
+        "afresh, the plan is kept where that fails (takes about 3 s per second of plan)",
     )
     parser.add_argument(
         "--execute", action="store_true", help="drive the plan closed-loop on the dynamic model"
