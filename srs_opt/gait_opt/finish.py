@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait
 from srs_opt.gait_opt.aim import aimed, evened, on_ticks
 from srs_opt.gait_opt.certificate import LIMIT_EXCESS, SPEED_ERROR, Certificate, certify
@@ -30,8 +31,20 @@ def topped(
 
     The mesh sees band and curvature at some instants only: where the finished gait exceeds a limit, less is
     asked for by as much. Where the optimum is worth less on ticks than the given gait, or only that gets a
-    certificate, the given one is kept.
+    certificate, the given one is kept; so it is where a soft body has no steady motion with what was found.
     """
+    try:
+        return _topped(problem, gait, reach, report)
+    except NoAnswerError:
+        plain = rounded(problem, gait)
+        speeds = tuple(orbit.speed_m_s for orbit in orbits_of(problem, plain))
+        certificate, orbits = certify(problem, plain, speeds)
+        return (Polished(plain, orbits, score(problem, plain, orbits), speeds, ()), certificate, orbits)
+
+
+def _topped(
+    problem: CycleProblem, gait: Gait, reach: float, report: Report | None
+) -> tuple[Polished, Certificate, tuple[Orbit, ...]]:
     asked, given = problem, gait
     for _ in range(_ROUNDS):
         exact = optimize_switch_times(asked, gait, reach, report)

@@ -18,7 +18,8 @@ def centre_line_function(structure: Structure, samples: int) -> ca.Function:
     """Return ``(kappa (N-1, samples), p) -> (x, y) (points, samples)`` in the robot's frame, tail to head.
 
     The first point is link 1, the last link N; every arc is given by its ends and points between, every
-    half gap by its ends. Chambers that lengthen do so with the curvature that they have.
+    half gap by its ends. Chambers that lengthen do so with the curvature that they have; on a body that bends
+    under load it is that without load, which moves points by half a millimetre at the typical size.
     """
     parameters, mechanics, _ = build(structure)
     p, kappa = parameters, mechanics.kappa

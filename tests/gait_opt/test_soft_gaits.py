@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from test_collocation import derivative_errors, held_gait
 
+from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Wave, published_wave
-from srs_opt.gait_opt import from_rest
+from srs_opt.gait_opt import finish, from_rest
 from srs_opt.gait_opt.collocation.guess import unknowns_from_orbits
 from srs_opt.gait_opt.collocation.layout import Mesh
 from srs_opt.gait_opt.collocation.problem import CycleProblem
@@ -119,3 +120,17 @@ def test_orbits_that_rest_does_not_reach_are_noticed():
     step = Step(Rung(0.002, 80, 0.1), 0.5, 0.5, 10, astray=0.01)
     assert not from_rest.misled([step])
     assert from_rest.misled([step, replace(step, astray=0.2)])
+
+
+def test_what_was_given_is_kept_where_no_better_gait_has_a_steady_motion(monkeypatch):
+    """As found at 0.0015 N m²: a hair beside a good gait the motion no longer repeats."""
+
+    def lost(*arguments):
+        raise NoAnswerError("the motion does not repeat with the gait's period")
+
+    monkeypatch.setattr(finish, "optimize_switch_times", lost)
+    rigid = CycleProblem((wpi_srs(),), "complex", Goal("speed"), Limits())
+    gait = published_wave(wpi_srs(), 2.0, 55.0).gait()
+    exact, certificate, orbits = finish.topped(rigid, gait, 0.02)
+    assert exact.gait == orbits[0].gait == finish.rounded(rigid, gait)
+    assert certificate.passed
