@@ -14,9 +14,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from srs_opt.calibrate.candidates import Candidate, effect_spec, entry_sd
+from srs_opt.calibrate.experiment import Experiment
 from srs_opt.calibrate.fit import Fit, start_point
 from srs_opt.calibrate.forms import form_of_entry, forms_of
-from srs_opt.discrepancy.examined import needed_gain
+from srs_opt.discrepancy.examined import Examined, needed_gain
 from srs_opt.discrepancy.hypothesis import Hypothesis
 from srs_opt.discrepancy.screen import Linearisation, Score, expected_start, screen
 from srs_opt.discrepancy.seal import Gap, open_seal
@@ -73,12 +74,18 @@ class Description:
         All terms that were fitted, to the start of a few trials, best first.
     why_not : str
         Why it is not believed; empty when it is.
+    examined : Examined or None
+        The best with its tests, where it is believed.
+    experiment : Experiment or None
+        In which it can be simulated.
     """
 
     best: Hypothesis
     gap: Gap | None
     tried: tuple[Hypothesis, ...]
     why_not: str
+    examined: Examined | None = None
+    experiment: Experiment | None = None
 
     @property
     def term(self) -> Term:
@@ -109,7 +116,10 @@ def describe_gap(
     terms = terms_of(robot.links, present)
     experiment = search.experiment.with_generic_terms()
     own = Search(experiment, search.base, terms, search.trials, search.seed, search.report, search.quick)
-    return describe(own, null.fit, listed.fit, sealed)
+    found = describe(own, null.fit, listed.fit, sealed)
+    if found is None or found.why_not:
+        return found
+    return replace(found, examined=own.examine(found.best), experiment=experiment)
 
 
 def terms_of(links: int, present: Sequence[str] = ()) -> tuple[Candidate, ...]:

@@ -97,9 +97,7 @@ class Discrepancy:
 
     @property
     def answer(self) -> Hypothesis | None:
-        """The best set of effects; a description where that is the answer."""
-        if self.verdict.word == DESCRIBED and self.description is not None:
-            return self.description.best
+        """The best set of effects, or the term that describes the gap."""
         return self.selection.best if self.selection else None
 
     @property
@@ -208,6 +206,9 @@ def _examine(
             misfit = misfit_by_trial(null)
             worst = max((t.name for t in split.open), key=lambda n: misfit[n])
             following = repeat_of(worst, null.linearisation.grams, "something that the model lacks")
+    if verdict.word == DESCRIBED and description is not None and description.examined is not None:
+        best = description.examined  # what the report shows, in a model that knows the term
+        selection, experiment = Selection(best.hypothesis, (), {}), description.experiment or experiment
     return Discrepancy(
         dataset,
         verdict,
