@@ -39,7 +39,7 @@ def main(out: Path = Path("out/examples")) -> float:
     """Return the radius (m) of the tightest turn found."""
     robot = wpi_srs()
     problem = CycleProblem((robot,), "complex", Goal("turn"), Limits().for_robot(robot))
-    tightest = search(problem, starts=2).orbits[0]
+    tightest = search(problem, starts=1).orbits[0]
     published = steady_gait(robot, published_wave(robot, 2.0, 55.0, 0.4).gait())
     draw({"published, offset 0.4": published, "tightest": tightest}, out / "tightest_turn")
     assert tightest.radius_m is not None and published.radius_m is not None
