@@ -22,6 +22,10 @@ from srs_opt.measurement.direction import head_first
 from srs_opt.measurement.onset import Gait, find_onset, first_curvatures
 from srs_opt.measurement.takes.formats import read_take
 from srs_opt.measurement.takes.take import ReadSettings
+from virtual_lab.simulate import run as run_lab
+from virtual_lab.trials import Schedule as LabSchedule
+from virtual_lab.trials import Trial as LabTrial
+from virtual_lab.truth import Truth
 
 RATE = 120.0
 NAMES = ["a", "b", "c", "d", "e"]
@@ -302,3 +306,39 @@ SHORT = {
     "rows.csv": write.motive_rows(_FEW, RATE, [7, 5, 9, 2, 11]).encode(),
     "take.c3d": write.c3d(_FEW, RATE, NAMES),
 }
+
+
+def step_take(moves, sd=2e-4):
+    """Markers of a snake that presses its second segment a second into the take, or never."""
+    rng, time_s = np.random.default_rng(2), np.arange(300) / RATE
+    held = LabTrial("s", 1e-9, 55.0, schedule=LabSchedule(((2, 0.0, 10.0),), 10.0), kind="step")
+    path = run_lab(Truth(), held, np.maximum(time_s - 1.0, 0) if moves else np.zeros(300))
+    exact = np.stack([path.x, path.y], axis=-1)
+    return exact + sd * rng.normal(size=exact.shape)
+
+
+def import_step(folder, moves, status):
+    (folder / "s.trc").write_text(write.trc(step_take(moves), RATE, NAMES))
+    (folder / "list.csv").write_text(f"{COLUMNS},kind\ns,0,55,0,0,step\n")
+    argv = [
+        str(folder / "s.trc"),
+        "--trials",
+        str(folder / "list.csv"),
+        "--out",
+        str(folder / "out"),
+        "--quiet",
+    ]
+    assert run_command(build_parser(), run, argv) == status
+
+
+def test_a_static_test_begins_shortly_before_its_first_motion(tmp_path):
+    import_step(tmp_path, True, 0)
+    (trial,) = load_dataset(tmp_path / "out").trials
+    assert trial.kind == "step"
+    begun = 300 / RATE - (trial.time_s[-1] - trial.time_s[0])
+    assert 0.5 < begun < 1.05
+
+
+def test_a_static_test_in_which_nothing_moves_asks_for_its_start(tmp_path, capsys):
+    import_step(tmp_path, False, 2)
+    assert "give valve_start_s" in capsys.readouterr().err
