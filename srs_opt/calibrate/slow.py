@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from srs_opt.calibrate.colour import CLEARLY
 from srs_opt.calibrate.coordinates import Coordinate
 from srs_opt.calibrate.experiment import Point
 from srs_opt.calibrate.gram import TrialGram, solve
@@ -24,6 +23,9 @@ from srs_opt.calibrate.objective import priors
 # hide effects at a third of their typical size, half as much would call a camera's usual drift a gap.
 DRIFTS_M = (0.0, 1e-4, 2e-4, 4e-4, 8e-4, 1.5e-3)
 SYSTEMATIC_M = (0.0, 2e-5, 4e-5, 8e-5, 1.5e-4, 3e-4)
+# drop of the deviance from which on they are believed: by chance once in a hundred sets, and then they cost
+# little; with twice as much, drift of half the noise stayed behind when a small effect was found
+CLEARLY = 6.0
 LOOSE = 3.0  # times its typical size: how far an effect is free to go before something counts as noise
 LEFT = 4.0  # deviations of the misfit's sum that may be left when they are believed
 

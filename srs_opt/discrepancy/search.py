@@ -192,10 +192,9 @@ class Search:
 
     def noise_aware(self, examined: Examined) -> Examined:
         """Return a hypothesis examined anew under smooth errors, if small ones explain what it leaves."""
-        now = self.experiment.noise
-        if examined.adequate or now.smooth or examined.linearisation.temper > FAR_OFF:
+        now, lin = self.experiment.noise, examined.linearisation
+        if examined.adequate or now.smooth or lin.temper > FAR_OFF:
             return examined
-        lin = examined.linearisation
         amplitudes = self.functions.amplitudes(self.trials, len(lin.coordinates))
         noise = smooth_part(now, lin.grams, amplitudes, lin.coordinates, lin.point)
         return examined if noise == now else self.examine(self._under(noise, examined.hypothesis))
@@ -324,7 +323,8 @@ class Search:
         ]
         if current.hypothesis.fit.temper < FAR_OFF:  # expected sizes can be believed
             scores = [s for s in scores if s.relative_size >= TELLING]
-        leaps = [s for s in current.scores if s.candidate.form.effect.bends]
+        far = current.hypothesis.fit.temper > 1  # nearer, a little bending's slopes hold as all others do
+        leaps = [s for s in current.scores if far and s.candidate.form.effect.bends]
         scores = [s for s in scores if s not in leaps]
         if not scores:
             return leaps
