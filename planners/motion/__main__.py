@@ -30,7 +30,7 @@ def run(options: argparse.Namespace) -> Answer:
     from srs_opt.robot import wpi_srs
 
     robot = wpi_srs()
-    table = load_table(options.gaits, robot) if options.gaits else default_table(robot)
+    table = load_table(options.gaits, robot).for_planning() if options.gaits else default_table(robot)
     say(options, f"{len(table.gaits)} gaits of '{table.robot_name}'")
     transitions = simulate_transitions(
         robot, table, progress=lambda rows: progress(rows, options, "gaits before")
