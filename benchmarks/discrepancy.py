@@ -97,7 +97,7 @@ def examine(kind: str, hidden: tuple[str, ...], seed: int, setting: str = "first
     """Generate and examine one set."""
     from benchmarks.discrepancy_baselines import baselines
     from srs_opt.discrepancy.answer import answer
-    from srs_opt.discrepancy.pipeline import find_discrepancy
+    from srs_opt.discrepancy.pipeline import diagnose
     from srs_opt.measurement.dataset import load_dataset
 
     with tempfile.TemporaryDirectory() as scratch:
@@ -108,7 +108,7 @@ def examine(kind: str, hidden: tuple[str, ...], seed: int, setting: str = "first
         dataset = load_dataset(folder)
         cpu = time.process_time()
         try:
-            found = find_discrepancy(dataset)
+            found = diagnose(dataset)
         except Exception as error:
             return row | {"verdict": f"crash: {error!r}"}
         said = answer(found, None)

@@ -110,7 +110,7 @@ def robots_of(effect: str, folder: Path) -> tuple[Truth, dict[str, Robot], str]:
     """Return the truth, the calibrated and the corrected robot, and what was said."""
     from srs_opt.calibrate.result import calibrated_robot
     from srs_opt.discrepancy.answer import corrected_robot
-    from srs_opt.discrepancy.pipeline import find_discrepancy
+    from srs_opt.discrepancy.pipeline import diagnose
     from srs_opt.measurement.dataset import load_dataset
     from virtual_lab.dataset import Recording, write_dataset
     from virtual_lab.draw import draw_truth
@@ -118,7 +118,7 @@ def robots_of(effect: str, folder: Path) -> tuple[Truth, dict[str, Robot], str]:
 
     truth = draw_truth((effect,), np.random.default_rng([11, 4]), (1.0, 1.0))
     write_dataset(folder, truth, small_design(np.random.default_rng([11, 5])), 11, Recording())
-    found = find_discrepancy(load_dataset(folder))
+    found = diagnose(load_dataset(folder))
     assert found.null is not None
     before = calibrated_robot(found.dataset.robot, found.null.hypothesis.fit)
     after = corrected_robot(found) or before  # what is not believed corrects nothing

@@ -46,7 +46,7 @@ def record(folder: Path, hidden: str, seed: int, instruments: Sequence[str]) -> 
 def examine(hidden: str, seed: int) -> Row:
     """Examine a set, read what is recommended while the answer is `one_of`."""
     from srs_opt.discrepancy.answer import answer
-    from srs_opt.discrepancy.pipeline import find_discrepancy
+    from srs_opt.discrepancy.pipeline import diagnose
     from srs_opt.measurement.dataset import load_dataset
 
     said: list[str] = []
@@ -56,7 +56,7 @@ def examine(hidden: str, seed: int) -> Row:
         with tempfile.TemporaryDirectory() as scratch:
             folder = Path(scratch) / "set"
             record(folder, hidden, seed, instruments)
-            found = answer(find_discrepancy(load_dataset(folder)), None)
+            found = answer(diagnose(load_dataset(folder)), None)
         said.append(found["verdict"])
         named = sorted(e["name"] for e in found["effects"])
         what = found["next_experiment"]["what"] if found["next_experiment"] else ""

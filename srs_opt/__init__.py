@@ -45,7 +45,7 @@ _PUBLIC = {
     "default_table": "srs_opt.gait_opt.catalogue",
     "load_table": "srs_opt.gait_opt.table",
     "load_dataset": "srs_opt.measurement.dataset",
-    "find_discrepancy": "srs_opt.discrepancy.pipeline",
+    "diagnose": "srs_opt.discrepancy.pipeline",
     "register_effect": "srs_opt.model.effects.__init__",
     "Maze": "planners.maze.maze",
     "load_maze": "planners.maze.load",

@@ -73,7 +73,7 @@ def build_parser() -> Parser:
 def run(options: argparse.Namespace) -> Answer:
     """Find the discrepancy; write the report and the corrected robot."""
     from srs_opt.calibrate.run import going_on_from
-    from srs_opt.discrepancy.pipeline import find_discrepancy
+    from srs_opt.discrepancy.pipeline import diagnose
     from srs_opt.measurement.dataset import load_dataset
     from srs_opt.parallel import executor
     from srs_opt.robot import load_robot
@@ -84,7 +84,7 @@ def run(options: argparse.Namespace) -> Answer:
     effects = _effect_names(options.effects) if options.effects else None
     maze = _maze(options, dataset.robot)
     with executor(options.jobs, options.cluster) as where:
-        found = find_discrepancy(
+        found = diagnose(
             dataset,
             effects,
             model=options.model,

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from srs_opt.calibrate.candidates import effect_spec, entry_sd, with_sd
 from srs_opt.calibrate.result import bench_warnings, calibrated_robot
 from srs_opt.discrepancy.examined import needed_gain
 from srs_opt.discrepancy.hypothesis import Hypothesis
 from srs_opt.discrepancy.locate import left_places
-from srs_opt.discrepancy.pipeline import Discrepancy
 from srs_opt.discrepancy.screen import Score
 from srs_opt.discrepancy.verdict import DESCRIBED, NO_GAP, ONE_OF
 from srs_opt.robot import Robot
+
+if TYPE_CHECKING:
+    from srs_opt.discrepancy.pipeline import Discrepancy
 
 VERSION = 1
 DESCRIBED_FILE = "described_robot.yaml"

@@ -8,12 +8,13 @@ import numpy as np
 
 from srs_opt.calibrate.noise import track_of
 from srs_opt.discrepancy.locate import misfit_by_trial
-from srs_opt.discrepancy.pipeline import Discrepancy
 from srs_opt.discrepancy.seal import sealed_residuals
 from srs_opt.figures import COLOURS, PAGE_IN, Picture, encoded, styled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from srs_opt.discrepancy.pipeline import Discrepancy
 
 AFTER, BEFORE = COLOURS[:2]
 
@@ -27,9 +28,23 @@ def pictures(found: Discrepancy) -> list[Picture]:
     return [_sealed(found), *drawn] if found.split.sealed else drawn
 
 
-@styled
 def gap_picture(found: Discrepancy) -> Picture | None:
     """Return the picture that shows the gap close: the sealed trial that shows it most."""
+    drawn = gap_figure(found)
+    if drawn is None:
+        return None
+    return encoded(
+        drawn,
+        "The gap closes",
+        "A trial that no fit saw. Left: the body at its end, as measured and as predicted with and without "
+        "the effect (thin: the way of the markers' mean). Right: root mean square distance per coordinate "
+        "over a fifth of a second.",
+    )
+
+
+@styled
+def gap_figure(found: Discrepancy) -> Figure | None:
+    """Return the figure of the gap that closes, where an effect closes one on sealed trials."""
     if found.experiment is None or found.null is None or found.selection is None or found.gap is None:
         return None
     trials = [t for t in found.split.sealed if t.name in found.gap.before.by_trial]
@@ -59,13 +74,8 @@ def gap_picture(found: Discrepancy) -> Picture | None:
     course.set_ylabel("distance to the markers (mm)")
     course.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
     room.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
-    return encoded(
-        figure,
-        f"The gap closes on {trial.name}",
-        f"A trial that no fit saw. Left: the body after {trial.time_s[last]:.1f} s, as measured and as "
-        "predicted with and without the effect (thin: the way of the markers' mean). Right: root mean square "
-        "distance per coordinate over a fifth of a second.",
-    )
+    room.set_title(f"{trial.name}, the body after {trial.time_s[last]:.1f} s", pad=26)
+    return figure
 
 
 def middle(points: np.ndarray) -> np.ndarray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 from srs_opt.calibrate.apart import stands_apart
 from srs_opt.calibrate.candidates import Candidate, all_candidates, fitted_coordinates
@@ -29,13 +30,18 @@ from srs_opt.discrepancy.settings import SETTINGS
 from srs_opt.discrepancy.split import Split, few_and_brief, split_trials
 from srs_opt.discrepancy.verdict import BELIEVED, DESCRIBED, NO_GAP, NOT_TESTABLE, UNKNOWN, Verdict, judge
 from srs_opt.discrepancy.visible import Visible, visible
+from srs_opt.errors import NoAnswerError
 from srs_opt.measurement.records import DataSet
 from srs_opt.model.effects.generic import TERMS
 from srs_opt.parallel import HERE, Executor
+from srs_opt.result import Result
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
-@dataclass(frozen=True)
-class Discrepancy:
+@dataclass(frozen=True, repr=False)
+class Discrepancy(Result):
     """Everything that was found.
 
     Attributes
@@ -100,13 +106,38 @@ class Discrepancy:
         """The best set of effects, or the term that describes the gap."""
         return self.selection.best if self.selection else None
 
+    def to_dict(self) -> dict[str, Any]:
+        """Return the content of discrepancy.json."""
+        from srs_opt.discrepancy.answer import answer
+
+        return answer(self, None)
+
+    def in_words(self) -> str:
+        """Return the verdict and its reason."""
+        return f"{self.verdict.word}: {self.verdict.why}"
+
+    def figure(self) -> Figure:
+        """Return the picture of the gap that closes on a sealed trial.
+
+        Raises
+        ------
+        NoAnswerError
+            If no effect closes a gap.
+        """
+        from srs_opt.discrepancy.pictures import gap_figure
+
+        drawn = gap_figure(self)
+        if drawn is None:
+            raise NoAnswerError(f"no gap to draw: {self.verdict.why}")
+        return drawn
+
     @property
     def set_aside(self) -> tuple[tuple[str, str], ...]:
         """Trials that no figure rests on, and why."""
         return (*self.split.left_out, *self.odd)
 
 
-def find_discrepancy(
+def diagnose(
     dataset: DataSet,
     effects: Sequence[str] | None = None,
     *,
@@ -279,4 +310,4 @@ def _not_testable(
     return Discrepancy(dataset, verdict, split, None, None, None, (), (), None, following, sd, seconds)
 
 
-__all__ = ["NO_GAP", "Discrepancy", "find_discrepancy"]
+__all__ = ["NO_GAP", "Discrepancy", "diagnose"]

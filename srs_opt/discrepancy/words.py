@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
-from srs_opt.discrepancy.pipeline import Discrepancy
+from typing import TYPE_CHECKING
+
 from srs_opt.discrepancy.verdict import NO_GAP
+
+if TYPE_CHECKING:
+    from srs_opt.discrepancy.pipeline import Discrepancy
 
 
 def in_words(found: Discrepancy) -> list[str]:
