@@ -52,7 +52,9 @@ def main(out: Path = Path("out/examples")) -> float:
     folder.mkdir(parents=True, exist_ok=True)
     rng = np.random.default_rng(7)
     trials = small_design(rng)
-    for trial, _, seen in tracks(TRUTH, trials, seed=7, recording=Recording(RATE_HZ, NOISE_M)):
+    for trial, _, seen in tracks(
+        TRUTH, trials, seed=7, recording=Recording(rate_hz=RATE_HZ, marker_sd_m=NOISE_M)
+    ):
         write_take(folder / f"{trial.name}.csv", trial.heading_rad, seen, rng)
     save_robot(wpi_srs(), folder / "robot.yaml")
     lists = {}

@@ -83,19 +83,26 @@ _Loader.add_constructor(
 )
 
 
-def read_yaml(path: Path | str, what: str) -> Document:
+def read_yaml(path: Path | str, what: str, *, lenient: bool = False) -> Document:
     """Read a YAML file (JSON is YAML too) into a `Document`.
+
+    A `lenient` reader gets numbers that are not finite too, to list them among the `violations`.
 
     Raises
     ------
     InputError
         If the file cannot be read, is not YAML, repeats a key or nests too deeply.
     """
-    return parse_yaml(read_text(path, what), str(path), what)
+    document = _parsed(read_text(path, what), str(path), what)
+    return document if lenient else _checked(document)
 
 
 def parse_yaml(text: str, source: str, what: str) -> Document:
     """Parse YAML `text`; `source` is named in complaints."""
+    return _checked(_parsed(text, source, what))
+
+
+def _parsed(text: str, source: str, what: str) -> Document:
     loader = None
     try:
         _check_size(text, source)
@@ -120,7 +127,7 @@ def parse_yaml(text: str, source: str, what: str) -> Document:
     finally:
         if loader is not None:
             loader.dispose()
-    return _checked(Document(source, value, lines))
+    return Document(source, value, lines)
 
 
 def read_json(path: Path | str, what: str) -> Document:
@@ -207,7 +214,8 @@ def violations(document: Document, schema: dict[str, Any]) -> list[InputError]:
 
     if document.value is None:
         return [document.error((), f"is empty (expected {_TYPES.get(schema.get('type', ''), 'content')})")]
-    found: list[InputError] = []
+    bad = dict(islice(_unusable(document.value, ()), MOST_VIOLATIONS))
+    found = [document.error(place, complaint) for place, complaint in bad.items()]
     validator = jsonschema.Draft202012Validator(schema)
     errors = list(islice(validator.iter_errors(document.value), MOST_VIOLATIONS))
     for error in sorted(errors, key=lambda e: (e.validator != "additionalProperties", len(e.absolute_path))):
@@ -218,7 +226,7 @@ def violations(document: Document, schema: dict[str, Any]) -> list[InputError]:
             known = sorted(error.schema.get("properties", {}))
             unknown = [str(k) for k in error.instance if k not in known]
             found += [document.error((*place, k), unknown_word("key", k, known)) for k in unknown]
-        else:
+        elif place not in bad:
             found.append(document.error(place, _plain(error)))
     return found
 

@@ -279,7 +279,7 @@ def load_robot(path: Path | str | None = None) -> Robot:
     """
     if path is None:
         return wpi_srs()
-    return robot_from_document(read_yaml(path, "a robot file (YAML)"))
+    return robot_from_document(read_yaml(path, "a robot file (YAML)", lenient=True))
 
 
 @lru_cache(maxsize=1)

@@ -95,13 +95,14 @@ def problem_from(options: argparse.Namespace) -> Problem:
     robot = load_robot(options.robot)
     check_margin(robot, options.margin)
     maze = maze_from(options, robot)
+    drive = None if options.drive is None else load_calibration(options.drive)
     return planning_problem(
         robot,
         maze,
         gaits_from(options, robot),
         margin_m=options.margin,
         valves=valve_limits(options),
-        drive=None if options.drive is None else load_calibration(options.drive),
+        drive=drive,
         cost=options.cost,
         tell=lambda text: say(options, text),
         show=lambda rows: progress(rows, options, "changes of gait (once per gait table)"),

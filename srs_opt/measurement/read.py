@@ -167,7 +167,7 @@ def _read_robot(folder: Path, name: str, fields: _Fields, report: Report) -> Rob
         fields.error(("robot",), f"'{name[:60]}' {reason}")
         return wpi_srs()
     try:
-        document = read_yaml(folder / name, "a robot file (YAML)")
+        document = read_yaml(folder / name, "a robot file (YAML)", lenient=True)
         problems = robot_problems(document)
     except InputError as error:
         problems = [error]

@@ -42,7 +42,7 @@ def test_the_small_structure_gives_the_slopes_of_the_full_one(setting):
     assert structure == model.rigid[-1]
     # linear actuators are integrated exactly, those with all effects to the order of the scheme
     assert found[0].pose == pytest.approx(found[1].pose, rel=1e-4, abs=1e-5)
-    assert found[0].kappa == pytest.approx(found[1].kappa, rel=1e-3, abs=1e-3)
+    assert found[0].shape == pytest.approx(found[1].shape, rel=1e-3, abs=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -72,7 +72,7 @@ def test_differences_are_the_tangents_of_the_integration(setting, effects):
         rounding = 1e-14 / (HAIR * typical[k])  # of states of the order of one
         for mine, theirs in (
             (found.pose[1:, :, k], tangent[:, :3]),
-            (found.kappa[1:, :, k], tangent[:, BODY_STATES : BODY_STATES + n]),
+            (found.shape[1:, :, k], tangent[:, BODY_STATES : BODY_STATES + n]),
         ):
             error = np.abs(mine - theirs).max()
             assert error < 1e-3 * np.abs(theirs).max() + 100 * rounding, coordinates[k].name
