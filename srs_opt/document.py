@@ -11,7 +11,7 @@ import json
 import re
 import sys
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from importlib import resources
 from itertools import islice
@@ -36,6 +36,7 @@ class Document:
     source: str
     value: Any
     lines: dict[Place, int] = field(default_factory=dict)
+    usable: bool = False  # every value is known to be one that a format can mean
 
     def where(self, place: Place) -> str:
         """Return ``file:line`` of the value at `place` (or of its nearest parent)."""
@@ -214,7 +215,7 @@ def violations(document: Document, schema: dict[str, Any]) -> list[InputError]:
 
     if document.value is None:
         return [document.error((), f"is empty (expected {_TYPES.get(schema.get('type', ''), 'content')})")]
-    bad = dict(islice(_unusable(document.value, ()), MOST_VIOLATIONS))
+    bad = {} if document.usable else dict(islice(_unusable(document.value, ()), MOST_VIOLATIONS))
     found = [document.error(place, complaint) for place, complaint in bad.items()]
     validator = jsonschema.Draft202012Validator(schema)
     errors = list(islice(validator.iter_errors(document.value), MOST_VIOLATIONS))
@@ -242,7 +243,7 @@ def _checked(document: Document) -> Document:
     """Return `document`; what no format means is refused for all of them: inf, nan, half a character."""
     for place, complaint in _unusable(document.value, ()):
         raise document.error(place, complaint)
-    return document
+    return replace(document, usable=True)
 
 
 def _unusable(value: Any, place: Place) -> Iterator[tuple[Place, str]]:

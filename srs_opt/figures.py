@@ -141,9 +141,14 @@ class Picture:
     png: str
 
 
-def encoded(figure: Figure, title: str, caption: str) -> Picture:
-    """Return a figure as a picture of a page that needs no other file."""
+def png_of(figure: Figure, **options: Any) -> bytes:
+    """Return a figure as PNG; options go to ``savefig``."""
     plain_names(figure)
     stream = io.BytesIO()
-    figure.savefig(stream, format="png", metadata={"Software": None})
-    return Picture(title, caption, base64.b64encode(stream.getvalue()).decode("ascii"))
+    figure.savefig(stream, format="png", metadata={"Software": None}, **options)
+    return stream.getvalue()
+
+
+def encoded(figure: Figure, title: str, caption: str) -> Picture:
+    """Return a figure as a picture of a page that needs no other file."""
+    return Picture(title, caption, base64.b64encode(png_of(figure)).decode("ascii"))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import io
+from abc import ABC, abstractmethod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,20 +13,20 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-class Result:
+class Result(ABC):
     """Base of results: a short text, `to_dict`, `save`, `plot`, and the picture in a notebook."""
 
+    @abstractmethod
     def in_words(self) -> str:
         """Return the result in one line."""
-        raise NotImplementedError
 
+    @abstractmethod
     def to_dict(self) -> dict[str, Any]:
         """Return the result as JSON can hold it; units are in the names of the keys."""
-        raise NotImplementedError
 
+    @abstractmethod
     def figure(self) -> Figure:
         """Return the result's picture as a matplotlib figure, which no window shows."""
-        raise NotImplementedError
 
     def save(self, path: Path | str) -> Path:
         """Write `to_dict` as JSON, whole or not at all; return the path."""
@@ -40,9 +40,6 @@ class Result:
         return f"<{type(self).__name__}: {self.in_words()}>"
 
     def _repr_png_(self) -> bytes:
-        from srs_opt.figures import plain_names
+        from srs_opt.figures import png_of
 
-        figure, stream = self.figure(), io.BytesIO()
-        plain_names(figure)
-        figure.savefig(stream, format="png", dpi=120)
-        return stream.getvalue()
+        return png_of(self.figure(), dpi=120)

@@ -9,7 +9,8 @@ from pathlib import Path
 from planners.maze.load import load_maze
 from planners.maze.maze import Maze
 from planners.maze.placement import check_placement
-from planners.maze.places import RobotSize
+from planners.maze.places import Goal, Pose, RobotSize
+from planners.maze.raster import Unknown
 from planners.motion.bending import Bending
 from planners.motion.store import load_motion
 from planners.motion.transitions import Progress
@@ -45,7 +46,7 @@ def planning_problem(
     ----------
     robot : Robot
     maze : Maze
-        With start and goal.
+        With start and goal, as `placed_maze` returns it.
     table : GaitTable
         Gaits that `valves` cannot play are left out.
     margin_m : float
@@ -60,13 +61,11 @@ def planning_problem(
     Raises
     ------
     InputError
-        If the straight robot does not fit at the start, or the margin is out of range.
+        If the valves can play no gait of the table.
     """
     import scipy.ndimage
     import scipy.sparse.csgraph  # noqa: F401  (imported here so that planning time is planning time)
 
-    check_margin(robot, margin_m)
-    check_placement(maze, RobotSize(robot.length_m, robot.body_width_m / 2, margin_m))
     table = table.for_planning()
     gaits = playable(robot, table, valves)
     if len(gaits.gaits) < len(table.gaits):
@@ -116,20 +115,53 @@ def valve_limits(options: argparse.Namespace) -> ValveLimits:
 
 def maze_from(options: argparse.Namespace, robot: Robot) -> Maze:
     """Return the maze with start and goal, both possible for the straight robot."""
-    size = RobotSize(robot.length_m, robot.body_width_m / 2, options.margin)
-    maze = load_maze(
+    return placed_maze(
+        robot,
         options.maze,
-        options.cell,
-        options.scale,
-        robot_length_m=size.length_m,
-        body_half_width_m=size.half_width_m,
-        margin_m=size.margin_m,
+        options.margin,
+        cell_m=options.cell,
+        scale=options.scale,
         start=options.start,
         goal=options.goal,
         unknown=options.unknown,
     )
-    check_placement(maze, size)
-    return maze
+
+
+def placed_maze(
+    robot: Robot,
+    maze: Maze | Path | str,
+    margin_m: float,
+    *,
+    cell_m: float | None = None,
+    scale: float = 1.0,
+    start: Pose | None = None,
+    goal: Goal | None = None,
+    unknown: Unknown = "wall",
+) -> Maze:
+    """Return the maze, read if need be, with start and goal; `start` and `goal` take its own's place.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or the straight robot does not fit into its start.
+    """
+    size = RobotSize(robot.length_m, robot.body_width_m / 2, margin_m)
+    if isinstance(maze, Maze):
+        found = maze.with_places(start, goal)
+    else:
+        found = load_maze(
+            maze,
+            cell_m,
+            scale,
+            robot_length_m=size.length_m,
+            body_half_width_m=size.half_width_m,
+            margin_m=size.margin_m,
+            start=start,
+            goal=goal,
+            unknown=unknown,
+        )
+    check_placement(found, size)
+    return found
 
 
 def gaits_from(options: argparse.Namespace, robot: Robot) -> GaitTable:

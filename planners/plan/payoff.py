@@ -4,19 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from planners.drive.execute import Execution, execute
-from planners.maze.load import load_maze
 from planners.maze.maze import Maze
-from planners.maze.placement import check_placement
-from planners.maze.places import RobotSize
 from planners.motion.store import load_motion
 from planners.plan.answer import Plan
 from planners.plan.certify import Certificate, certify
+from planners.plan.options import MARGIN_M
 from planners.plan.solve import solve_with_lattice
 from planners.search.problem import Problem
 from srs_opt.gait import Gait
@@ -24,7 +21,6 @@ from srs_opt.gait_opt.companions import leaned_family
 from srs_opt.gait_opt.table import GaitTable
 from srs_opt.robot import Robot
 
-MARGIN_M = 0.005
 MOST_NODES, TIME_LIMIT_S = 20_000, 120.0
 Tell = Callable[[str], None]
 
@@ -107,22 +103,6 @@ class MazePayoff:
             for which, ride in (("calibrated", self.before), ("corrected", self.after))
         ]
         return f"through {self.maze.name}, on the corrected robot: {'; '.join(said)}"
-
-
-def maze_of(path: Path, robot: Robot) -> Maze:
-    """Return the maze, checked for the robot.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read, or the straight robot does not fit into its start.
-    """
-    size = RobotSize(robot.length_m, robot.body_width_m / 2, MARGIN_M)
-    maze = load_maze(
-        path, robot_length_m=size.length_m, body_half_width_m=size.half_width_m, margin_m=MARGIN_M
-    )
-    check_placement(maze, size)
-    return maze
 
 
 def maze_payoff(

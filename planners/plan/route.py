@@ -9,13 +9,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from planners.drive.execute import Execution, execute
-from planners.maze.load import load_maze
 from planners.maze.maze import Maze
-from planners.maze.places import Goal, Pose, RobotSize
+from planners.maze.places import Goal, Pose
 from planners.motion.valves import DEFAULT_LIMITS, ValveLimits
 from planners.plan.answer import Plan, PlanResult
 from planners.plan.explain import Explanation, explain
-from planners.plan.inputs import gaits_for, planning_problem
+from planners.plan.inputs import check_margin, gaits_for, placed_maze, planning_problem
 from planners.plan.looks import Looks, looks
 from planners.plan.options import MARGIN_M
 from planners.plan.portfolio import Wish, solve
@@ -192,16 +191,11 @@ def plan(
     True
     """
     robot = robot or wpi_srs()
-    if not isinstance(maze, Maze):
-        size = RobotSize(robot.length_m, robot.body_width_m / 2, margin_m)
-        maze = load_maze(
-            maze, robot_length_m=size.length_m, body_half_width_m=size.half_width_m, margin_m=margin_m,
-            start=start, goal=goal,
-        )  # fmt: skip
-    maze = maze.with_places(start, goal)
+    check_margin(robot, margin_m)
+    placed = placed_maze(robot, maze, margin_m, start=start, goal=goal)
     table = gaits or gaits_for(robot, tell=say)
     problem = planning_problem(
-        robot, maze, table, margin_m=margin_m, valves=valves, drive=drive, cost=cost, tell=say
+        robot, placed, table, margin_m=margin_m, valves=valves, drive=drive, cost=cost, tell=say
     )
     return Route(problem, solve(problem, Wish(planner, seed, time_limit_s, best), say))
 

@@ -25,6 +25,7 @@ from planners.refine.window import Window
 from planners.search.problem import Problem
 from planners.search.tree import at_rest
 from srs_opt.errors import InputError, NoAnswerError
+from srs_opt.manoeuvre.order import standing_s
 from srs_opt.orbit.sensitivity import actuator_rates
 from srs_opt.simulate.integrate import Integrator
 
@@ -169,7 +170,8 @@ class _Refiner:
             end = End() if last else End(self.ends[first + size - 1])
             limits = Limits(problem, end, slack if not kept else 0.0, self.spare)
             solver = WindowSolver(problem.run, state, limits, before, problem.joints.limits, self.pressures)
-            solver.tail_s = (0.0,) * segments if last else self._tail_s(guess[size])
+            if not last:
+                solver.tail_s = standing_s(guess[size].gait, problem.joints.limits.dwell_s)
             found = solver.solve(window, STEPS)
             now = size if last else KEPT
             window = self._rounded(solver, found, now)
@@ -203,14 +205,6 @@ class _Refiner:
     def _played(self, joint: Joint, state: Array) -> Array:
         tolerance = TOLERANCE * self.problem.robot.length_m / 16
         return self.problem.run.run(joint.timeline(CERTIFIED_STAIR_S), state, tolerance).final
-
-    def _tail_s(self, following: Joint) -> tuple[float, ...]:
-        """Return how long each segment's last state must have stood where the window ends."""
-        least, tails = self.problem.joints.limits.dwell_s, []
-        for pairs in following.gait.intervals:
-            first = min(t for pair in pairs for t in pair)
-            tails.append(max(least - first, 0.0))
-        return tuple(tails)
 
 
 def _until(window: Window, arrives_s: float) -> Window:

@@ -14,6 +14,7 @@ from planners.refine.limits import Limits, Values
 from planners.refine.shots import WindowShot, shoot_windows, with_slopes
 from planners.refine.window import Window
 from srs_opt.errors import NoAnswerError
+from srs_opt.manoeuvre.order import OrderRows
 from srs_opt.simulate.integrate import Integrator
 
 Array = NDArray[np.float64]
@@ -177,41 +178,33 @@ class WindowSolver:
         """
         tick = self.valves.tick_s
         least = self.valves.dwell_s + ticks * tick
-        entries: list[tuple[int, int, float]] = []
-        room: list[float] = []
-
-        def row(later: int | None, earlier: int | None, gap: float) -> None:
-            if later is not None:
-                entries.append((len(room), later, -1.0))
-            if earlier is not None:
-                entries.append((len(room), earlier, 1.0))
-            room.append(gap)
-
+        rows = OrderRows()
         ends, first = window.switches, 0
         for k, end in enumerate(window.ends_s):
             begin = window.ends_s[k - 1] if k else 0.0
             shortest = max(window.ramp_s[k], 2 * least)
-            row(ends + k, ends + k - 1 if k else None, end - begin - shortest)
+            rows.add(ends + k, ends + k - 1 if k else None, end - begin - shortest)
         before = zip(self.before.states, self.before.ages_s, self.tail_s)
         for valves, owners, (state, age, tail) in zip(window.rows, window.cycle_of, before):
             times = valves.times_s
             since = -age if valves.states[0] == state else 0.0
             for j, (time, k) in enumerate(zip(times, owners)):
-                row(first + j, first + j - 1 if j else None, time - (times[j - 1] if j else since) - least)
+                rows.add(
+                    first + j, first + j - 1 if j else None, time - (times[j - 1] if j else since) - least
+                )
                 begin, end = window.ends_s[k - 1] if k else 0.0, window.ends_s[k]
                 last = j + 1 == len(times) or owners[j + 1] != k
-                row(
+                rows.add(
                     first + j,
                     ends + k - 1 if k else None,
                     time - begin - ((1 + ticks) * tick if last else 0.0),
                 )
-                row(ends + k, first + j, end - time - (1 + ticks) * tick)
+                rows.add(ends + k, first + j, end - time - (1 + ticks) * tick)
             if times and tail and ticks:
-                row(
+                rows.add(
                     ends + window.cycles - 1,
                     first + len(times) - 1,
                     window.ends_s[-1] - times[-1] - tail - 2 * ticks * tick,
                 )
             first += len(times)
-        at_row, at_column, value = zip(*entries)
-        return sparse.csr_matrix((value, (at_row, at_column)), shape=(len(room), window.size)), np.array(room)
+        return rows.matrix(window.size)

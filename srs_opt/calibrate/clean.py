@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from srs_opt.calibrate.noise import track_of
+from srs_opt.calibrate.noise import MAD, track_of
 from srs_opt.measurement.chain import chain_of
 from srs_opt.measurement.labels import mend_labels
 from srs_opt.measurement.records import Array, DataSet, Trial
@@ -22,7 +22,6 @@ FEWEST, MOST = 2, 5  # frames to either side
 FAR = 5.0
 NEARBY = 5  # times that reach: a neighbourhood, of which an outlier spoils a fifth
 PASSES = 12  # a marker that is elsewhere for several frames spoils its neighbours' parabolas
-_MAD = 0.674489750196
 
 
 @dataclass(frozen=True)
@@ -104,7 +103,7 @@ def outliers_of(points: Array, time_s: Array) -> np.ndarray:
     if not sure.any():
         return wild
     # where a quiet camera sees a quick motion, its parabolas are off by more than the noise
-    usual = np.median(np.abs(off[sure])) / _MAD
+    usual = np.median(np.abs(off[sure])) / MAD
     limit = FAR * np.maximum(usual, _usual_nearby(size, NEARBY * reach))
     some = np.arange(markers)
     for _ in range(PASSES):

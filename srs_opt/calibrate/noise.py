@@ -14,7 +14,7 @@ from srs_opt.measurement.records import DataSet, Trial
 
 ORDER = 4
 _LEAST = 50  # differences that an estimate needs
-_MAD = 0.674489750196  # median |x| of a unit normal
+MAD = 0.674489750196  # median |x| of a unit normal
 _WILD = 5.0  # robust standard deviations beyond which a difference is a jump, not noise
 
 
@@ -84,6 +84,6 @@ def _white_sd_m(dataset: DataSet) -> float:
         return dataset.marker_sd_m
     gain = np.sqrt(comb(2 * ORDER, ORDER))
     size = np.abs(pooled)
-    usual = np.median(size) / _MAD
+    usual = np.median(size) / MAD
     sd = float(np.sqrt(np.mean(size[size <= _WILD * usual] ** 2)) / gain)
     return sd if sd > 0 else dataset.marker_sd_m

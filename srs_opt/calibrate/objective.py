@@ -186,6 +186,33 @@ def _solved(
     return bounded_solve(total, range(len(coordinates)), precision, offset, lower - now)
 
 
+def projected(
+    total: np.ndarray, fitted: int, precision: np.ndarray, rank: float | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Project what is fitted out of what is not.
+
+    Parameters
+    ----------
+    total : array (n, n)
+        Normal equations, the fitted columns first.
+    precision : array (fitted or more,)
+        Of the priors.
+    rank : float, optional
+        Smallest eigenvalue of the fitted part, over its largest, that counts; default numpy's.
+
+    Returns
+    -------
+    inverse : array (fitted, fitted)
+        Covariance of the fitted.
+    left : array (n - fitted, n - fitted)
+        Normal equations of the others after the fitted have followed them.
+    """
+    inner = total[:fitted, :fitted] + np.diag(precision[:fitted])
+    inverse = np.linalg.pinv(inner, rcond=rank, hermitian=True)
+    cross = total[:fitted, fitted:]
+    return inverse, total[fitted:, fitted:] - cross.T @ inverse @ cross
+
+
 def sum_eliminated(grams: Mapping[str, TrialGram], temper: float = 1.0) -> np.ndarray:
     """Return the sum of the trials' matrices, scatter integrated out."""
     return np.sum([g.eliminated(temper).matrix for g in grams.values()], axis=0)

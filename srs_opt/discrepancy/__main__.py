@@ -129,9 +129,10 @@ def _maze(options: argparse.Namespace, robot: Robot) -> Maze | None:
     """Return the maze of --maze, looked at before anything slow."""
     if options.maze is None:
         return None
-    from planners.plan.payoff import maze_of
+    from planners.plan.inputs import placed_maze
+    from planners.plan.options import MARGIN_M
 
-    return maze_of(options.maze, robot)
+    return placed_maze(robot, options.maze, MARGIN_M)
 
 
 def _payoff(

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from srs_opt.calibrate.candidates import Candidate
-from srs_opt.calibrate.objective import priors, sum_eliminated
+from srs_opt.calibrate.objective import priors, projected, sum_eliminated
 from srs_opt.discrepancy.screen import Linearisation
 
 # 20 degrees: 0.9 of what one effect does the other can do too. Half leaves out pairs that noisier data would
@@ -40,9 +40,7 @@ class Angles:
         size, fitted = len(lin.coordinates), lin.fitted
         total = sum_eliminated(lin.grams, lin.temper)[:size, :size]
         precision, _ = priors(lin.coordinates, lin.point)
-        inner = total[:fitted, :fitted] + np.diag(precision[:fitted])
-        cross = total[:fitted, fitted:]
-        self._seen = total[fitted:, fitted:] - cross.T @ np.linalg.pinv(inner, hermitian=True) @ cross
+        _, self._seen = projected(total, fitted, precision)
         self._whole = np.diag(total)[fitted:]
 
     def columns(self, candidate: Candidate) -> list[int]:

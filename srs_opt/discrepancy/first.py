@@ -10,9 +10,10 @@ import numpy as np
 from srs_opt.calibrate.candidates import all_candidates, fitted_coordinates
 from srs_opt.calibrate.experiment import Experiment, Point
 from srs_opt.calibrate.fit import start_point
+from srs_opt.calibrate.gram import RANK
 from srs_opt.calibrate.model import Model
 from srs_opt.calibrate.noise import Noise
-from srs_opt.calibrate.objective import priors, sum_eliminated
+from srs_opt.calibrate.objective import priors, projected, sum_eliminated
 from srs_opt.discrepancy.design import NOTHING, NextExperiment
 from srs_opt.discrepancy.examined import FALSE_NAME
 from srs_opt.errors import NoAnswerError
@@ -48,12 +49,11 @@ def first_experiment(dataset: DataSet, noise: Noise, model: str | None = None) -
         return None
     total, fitted = sum_eliminated(grams), len(coordinates)
     precision, _ = priors(coordinates, point)
-    inner = np.linalg.pinv(total[:fitted, :fitted] + np.diag(precision), rcond=1e-12, hermitian=True)
+    _, left = projected(total, fitted, precision, RANK)
     limit = chdtri(1, FALSE_NAME / len(candidates))
     powers: dict[str, float] = {}
-    for k, candidate in enumerate(candidates, fitted):
-        cross = total[:fitted, k]
-        gain = candidate.sizes[0].typical ** 2 * float(total[k, k] - cross @ inner @ cross)
+    for k, candidate in enumerate(candidates):
+        gain = candidate.sizes[0].typical ** 2 * float(left[k, k])
         found = float(1 - chndtr(limit, 1, max(gain, 1e-9)))
         powers[candidate.effect] = min(found, powers.get(candidate.effect, 1.0))
     sure = sum(p > 0.9 for p in powers.values())

@@ -9,8 +9,9 @@ import numpy as np
 
 from srs_opt.calibrate.candidates import Candidate
 from srs_opt.calibrate.experiment import Experiment, Point
+from srs_opt.calibrate.gram import RANK
 from srs_opt.calibrate.noise import track_of
-from srs_opt.calibrate.objective import priors, sum_eliminated
+from srs_opt.calibrate.objective import priors, projected, sum_eliminated
 from srs_opt.discrepancy.examined import Examined, needed_gain
 from srs_opt.discrepancy.hypothesis import LARGE
 from srs_opt.discrepancy.motions import motion_errors
@@ -68,15 +69,17 @@ def visible(
     lin = null.linearisation
     total = sum_eliminated(lin.grams, lin.temper)
     precision, _ = priors(lin.coordinates, lin.point)
-    fitted = range(lin.fitted)
-    inner = total[np.ix_(fitted, fitted)] + np.diag(precision[: lin.fitted])
-    inverse = np.linalg.pinv(inner, rcond=1e-12, hermitian=True)
+    inverse, left = projected(total, lin.fitted, precision, RANK)
+    free = {c.name: k for k, c in enumerate(lin.coordinates[lin.fitted :])}
     played = _spread([t for t in trials if t.kind == "gait"] or trials)
     sizes, unseen = {}, []
     for effect in dict.fromkeys(c.effect for c in candidates):
         places = [c for c in candidates if c.effect == effect]
-        found = [(_least(total, lin.column(c.sizes[0].name), inverse, c, len(null.scores)), c) for c in places
-                 if c.sizes[0].name in {k.name for k in lin.coordinates[lin.fitted :]}]  # fmt: skip
+        columns = [(free[c.sizes[0].name], c) for c in places if c.sizes[0].name in free]
+        found = [
+            (_least(left[k, k], total[lin.fitted + k, lin.fitted + k], c, len(null.scores)), c)
+            for k, c in columns
+        ]
         seen = [(s, c) for s, c in found if s <= LARGE * c.sizes[0].typical]
         if found and not seen:
             unseen.append(effect)
@@ -121,12 +124,12 @@ def _needed(candidate: Candidate, family: int) -> float:
     return float(np.sqrt(needed_gain(candidate, family))) + SURELY
 
 
-def _least(total: np.ndarray, column: int, inverse: np.ndarray, candidate: Candidate, family: int) -> float:
-    """Return the size at which an effect is found nine times in ten."""
-    fitted = inverse.shape[0]
-    cross = total[:fitted, column]
-    information = float(total[column, column] - cross @ inverse @ cross)
-    if information <= 1e-9 * float(total[column, column]):
+def _least(information: float, whole: float, candidate: Candidate, family: int) -> float:
+    """Return the size at which an effect is found nine times in ten.
+
+    `information` is what of the `whole` is left when the fitted have followed.
+    """
+    if information <= 1e-9 * whole:
         return float("inf")
     return _needed(candidate, family) / float(np.sqrt(information))
 

@@ -15,6 +15,7 @@ from scipy import sparse
 from scipy.optimize import linprog
 
 from srs_opt.errors import NoAnswerError
+from srs_opt.manoeuvre.order import OrderRows, standing_s
 from srs_opt.manoeuvre.rows import RowMaker, Rows
 from srs_opt.manoeuvre.shooting import STEP_S, Shot, shoot, shoot_with_slopes
 from srs_opt.manoeuvre.task import Task
@@ -171,16 +172,7 @@ class Solver:
         """Return ``A x <= b``: switches of a segment keep the dwell, at start and end too."""
         least = self.task.bounds.dwell_s
         n = plan.switches
-        entries: list[tuple[int, int, float]] = []
-        room: list[float] = []
-
-        def row(later: int | None, earlier: int | None, gap: float) -> None:
-            if later is not None:
-                entries.append((len(room), later, -1.0))
-            if earlier is not None:
-                entries.append((len(room), earlier, 1.0))
-            room.append(gap)
-
+        rows = OrderRows()
         first = 0
         tail = self._tail_s()
         for segment, (valves, age) in enumerate(zip(plan.rows, self.ages)):
@@ -190,26 +182,20 @@ class Solver:
                     # at rest a valve may be vented until its first switch: no dwell before that
                     wait = 0.0 if valves.states[0] == 0 else least
                     since = 0.0 if age == np.inf else -age
-                    row(first, None, time - since - wait)
+                    rows.add(first, None, time - since - wait)
                 else:
-                    row(first + k, first + k - 1, time - times[k - 1] - least)
+                    rows.add(first + k, first + k - 1, time - times[k - 1] - least)
             if times:
-                row(n, first + len(times) - 1, plan.duration_s - times[-1] - tail[segment])
+                rows.add(n, first + len(times) - 1, plan.duration_s - times[-1] - tail[segment])
             first += len(times)
-        if not room:
-            return sparse.csr_matrix((0, size)), np.zeros(0)
-        at_row, at_column, value = zip(*entries)
-        matrix = sparse.csr_matrix((value, (at_row, at_column)), shape=(len(room), size))
-        return matrix, np.array(room)
+        return rows.matrix(size)
 
-    def _tail_s(self) -> list[float]:
+    def _tail_s(self) -> tuple[float, ...]:
         """Return how long each segment's last state must have stood at the end."""
         orbit = self.task.end.orbit
         if orbit is None:
-            return [0.0] * self.run.structure.segments
-        gait = orbit.gait
-        first = [min(t for pair in pairs for t in pair) for pairs in gait.intervals]
-        return [max(self.task.bounds.dwell_s - t, 0.0) for t in first]
+            return (0.0,) * self.run.structure.segments
+        return standing_s(orbit.gait, self.task.bounds.dwell_s)
 
 
 def _split(x: np.ndarray) -> tuple[np.ndarray, float, float]:

@@ -46,12 +46,17 @@ def texts():
     }
 
 
+def import_take(folder, name, *extra, status=0, out="out"):
+    """Import a file of the folder with the folder's list.csv, into its subfolder `out`."""
+    argv = [str(folder / name), "--trials", str(folder / "list.csv"), "--out", str(folder / out), *extra]
+    assert run_command(build_parser(), run, argv) == status
+
+
 def import_file(folder, name, data, row=ROW, *extra, status=0):
     path = folder / name
     path.write_bytes(data if isinstance(data, bytes) else data.encode())
     (folder / "list.csv").write_text(f"{COLUMNS},valve_start_s\n{row}\n")
-    argv = [str(path), "--trials", str(folder / "list.csv"), "--out", str(folder / "out"), "--quiet", *extra]
-    assert run_command(build_parser(), run, argv) == status
+    import_take(folder, name, "--quiet", *extra, status=status)
     return load_dataset(folder / "out").trials[0] if status == 0 else None
 
 
@@ -177,15 +182,7 @@ def test_a_take_in_mid_gait_is_told(tmp_path, capsys):
         folder.mkdir()
         (folder / "m1.csv").write_text(motive_text())
         (folder / "list.csv").write_text(f"{COLUMNS},valve_start_s\n{row}\n")
-        argv = [
-            str(folder / "m1.csv"),
-            "--trials",
-            str(folder / "list.csv"),
-            "--out",
-            str(folder / "o"),
-            "--json",
-        ]
-        assert run_command(build_parser(), run, argv) == 0
+        import_take(folder, "m1.csv", "--json")
         said = json.loads(capsys.readouterr().out)["trials"][0]["warnings"]
         assert any("mid-gait" in word for word in said) == told
 
@@ -196,16 +193,8 @@ def test_schedules_come_along(tmp_path):
     )
     (tmp_path / "m1.csv").write_text(motive_text())
     (tmp_path / "list.csv").write_text(f"{COLUMNS},valve_start_s,schedule\nm1,,48,,,{START},s\n")
-    argv = [
-        str(tmp_path / "m1.csv"),
-        "--trials",
-        str(tmp_path / "list.csv"),
-        "--out",
-        str(tmp_path / "o"),
-        "--quiet",
-    ]
-    assert run_command(build_parser(), run, argv) == 0
-    trial = load_dataset(tmp_path / "o").trials[0]
+    import_take(tmp_path, "m1.csv", "--quiet")
+    trial = load_dataset(tmp_path / "out").trials[0]
     assert trial.schedule.intervals[0] == (1, 0.1, 0.3)
     assert trial.frequency_hz == 2
 
@@ -260,15 +249,7 @@ def test_columns_by_hand(tmp_path):
 def test_what_was_guessed_is_told(tmp_path, capsys):
     (tmp_path / "list.csv").write_text(f"{COLUMNS},valve_start_s\n{ROW}\n")
     (tmp_path / "t.tsv").write_text(texts()["qualisys.tsv"])
-    argv = [
-        str(tmp_path / "t.tsv"),
-        "--trials",
-        str(tmp_path / "list.csv"),
-        "--out",
-        str(tmp_path / "o"),
-        "--json",
-    ]
-    assert run_command(build_parser(), run, argv) == 0
+    import_take(tmp_path, "t.tsv", "--json", out="o")
     said = json.loads(capsys.readouterr().out)["trials"][0]["warnings"]
     assert any("millimetres" in word for word in said)
     assert any("0, 0, 0" in word for word in said)
@@ -320,15 +301,7 @@ def step_take(moves, sd=2e-4):
 def import_step(folder, moves, status):
     (folder / "s.trc").write_text(write.trc(step_take(moves), RATE, NAMES))
     (folder / "list.csv").write_text(f"{COLUMNS},kind\ns,0,55,0,0,step\n")
-    argv = [
-        str(folder / "s.trc"),
-        "--trials",
-        str(folder / "list.csv"),
-        "--out",
-        str(folder / "out"),
-        "--quiet",
-    ]
-    assert run_command(build_parser(), run, argv) == status
+    import_take(folder, "s.trc", "--quiet", status=status)
 
 
 def test_a_static_test_begins_shortly_before_its_first_motion(tmp_path):
