@@ -22,7 +22,7 @@ from srs_opt.calibrate.objective import (
     misfit_ratio,
     newton_step,
     objective,
-    temper_of,
+    variance_inflation_of,
     within_reach,
 )
 from srs_opt.errors import NoAnswerError
@@ -34,10 +34,10 @@ CONVERGED = 0.05  # of the deviance: a fifth of a standard deviation
 HOPELESS, HOPELESS_SHARE = 300.0, 0.1
 TRIED = 2  # iterations before that is believed
 TRUSTED = 0.25  # of the gain that slopes promise: with no larger error they serve for the next step too
-PLAIN = 25.0  # temper above which a misfit hides the errors of a simulation five times as rough
+PLAIN = 25.0  # variance inflation above which a misfit hides the errors of a simulation five times as rough
 PLAINLY = 0.01  # share of such a misfit that need not be gained
 CRAWL = 0.03  # share of the misfit; slopes of an earlier point that promise less are not worth a step
-FAR_OFF = 3.0  # temper from which on a fit does not explain the data
+FAR_OFF = 3.0  # variance inflation from which on a fit does not explain the data
 LEAST_DAMPING = 0.001  # below: none
 FIRST_DAMPING = 0.02
 IDLE, MOST_DAMPING = 2, 1e4  # steps that gain nothing, and damping, at which a fit is given up
@@ -83,7 +83,7 @@ class Fit:
         -2 log posterior at the point, trial scatter integrated out (up to a constant of the data).
     misfit_ratio : float
         Sum of squared residuals over its expectation under noise alone.
-    temper : float
+    variance_inflation : float
         By how much the noise variance was raised in the fit because the model does not explain the data.
     grams : dict
         Trial name -> TrialGram at the point.
@@ -99,7 +99,7 @@ class Fit:
     covariance: np.ndarray
     deviance: float
     misfit_ratio: float
-    temper: float
+    variance_inflation: float
     grams: dict[str, TrialGram]
     iterations: int
     converged: bool
@@ -146,7 +146,7 @@ def fit(
     beat : float
         A deviance; a fit that cannot come near it is not finished.
     correlated : float
-        Values that a misfit makes count as one: see `temper_of`.
+        Values that a misfit makes count as one: see `variance_inflation_of`.
     near : float
         Share of the misfit beyond the noise that a fit far off may leave to be gained and still count as
         converged: what does not explain the data need not be known well.
@@ -204,7 +204,7 @@ class _Descent:
     def refresh(self) -> None:
         """Take the slopes anew, from a fine simulation once the misfit does not hide a rough one."""
         self.grams = self._measured(self.point)
-        if self.rough and self.temper <= PLAIN:
+        if self.rough and self.variance_inflation <= PLAIN:
             self.rough = False
             self.grams = self._measured(self.point)
 
@@ -220,32 +220,32 @@ class _Descent:
         return any(g.stale for g in self.grams.values())
 
     @property
-    def temper(self) -> float:
+    def variance_inflation(self) -> float:
         """Factor on the noise variance."""
-        return temper_of(self.grams, self.correlated)
+        return variance_inflation_of(self.grams, self.correlated)
 
     @property
     def jitter(self) -> float:
         """Deviance below which a loss is the integration's."""
-        return max(CONVERGED, JITTER * sum(g.count for g in self.grams.values()) / self.temper)
+        return max(CONVERGED, JITTER * sum(g.count for g in self.grams.values()) / self.variance_inflation)
 
     def now(self) -> float:
         """Return the objective at the point."""
-        return objective(self.coordinates, self.grams, self.point, self.temper)
+        return objective(self.coordinates, self.grams, self.point, self.variance_inflation)
 
     def missing(self) -> float:
         """Return what the linearisation promises to gain."""
-        return self.now() - within_reach(self.coordinates, self.grams, self.point, self.temper)
+        return self.now() - within_reach(self.coordinates, self.grams, self.point, self.variance_inflation)
 
     def arrived(self) -> bool:
         """Whether fresh slopes promise to gain next to nothing."""
         while True:
-            enough, temper = CONVERGED, self.temper
-            if temper > FAR_OFF:
-                near = max(self.near, PLAINLY) if temper > PLAIN else self.near
-                enough = max(CONVERGED, near * excess_of(self.grams) / temper)
+            enough, inflation = CONVERGED, self.variance_inflation
+            if inflation > FAR_OFF:
+                near = max(self.near, PLAINLY) if inflation > PLAIN else self.near
+                enough = max(CONVERGED, near * excess_of(self.grams) / inflation)
             if self.stale:
-                enough = max(enough, CRAWL * excess_of(self.grams) / temper)
+                enough = max(enough, CRAWL * excess_of(self.grams) / inflation)
             if self.missing() >= enough:
                 return False
             if not self.stale:
@@ -263,16 +263,16 @@ class _Descent:
     def step(self) -> None:
         """Go on where that gains, else take fresh slopes or damp the next step."""
         self.done += 1
-        stale, temper, now, jitter = self.stale, self.temper, self.now(), self.jitter
-        move = best_move(self.coordinates, self.grams, self.point, temper, self.damping)
+        stale, inflation, now, jitter = self.stale, self.variance_inflation, self.now(), self.jitter
+        move = best_move(self.coordinates, self.grams, self.point, inflation, self.damping)
         try:
             if self.winding and self.bends and not stale:
                 move = self._bent(move)
             moved = _moved(self.point, self.coordinates, move)
             grams = self._measured(moved, stale=True)
             before, after = (self.point, self.grams), (moved, grams)
-            moved = self._tamed(before, after, temper)
-            gain = now - objective(self.coordinates, grams, moved, temper)
+            moved = self._tamed(before, after, inflation)
+            gain = now - objective(self.coordinates, grams, moved, inflation)
         except NoAnswerError:
             gain = -math.inf
         if gain > -jitter:
@@ -281,7 +281,7 @@ class _Descent:
             self._ease(gain, move.promised)
             off = abs(gain - move.promised) > TRUSTED * move.promised
             self.winding = off
-            if off or (self.rough and self.temper <= PLAIN):
+            if off or (self.rough and self.variance_inflation <= PLAIN):
                 self.refresh()
         elif stale:
             self.winding = True
@@ -303,14 +303,14 @@ class _Descent:
         there = _moved(self.point, self.coordinates, short)
         ahead = self._measured(there, stale=True)
         self.bends = any(g.stale for g in ahead.values())
-        own = self.coordinates, self.grams, ahead, self.point, self.temper, self.damping
+        own = self.coordinates, self.grams, ahead, self.point, self.variance_inflation, self.damping
         return bent_move(*own, move) if self.bends else move
 
     def _tamed(
         self,
         before: tuple[Point, Mapping[str, TrialGram]],
         after: tuple[Point, dict[str, TrialGram]],
-        temper: float,
+        inflation: float,
     ) -> Point:
         """Return the new point with the scatter of trials that went astray taken back; their matrices follow.
 
@@ -321,14 +321,14 @@ class _Descent:
         step = np.array([moved.values[c.name] - point.values[c.name] for c in self.coordinates])
 
         def own(gram: TrialGram) -> float:
-            return gram.misfit / temper + float(np.sum((gram.scatter_now / gram.scatter_sd) ** 2))
+            return gram.misfit / inflation + float(np.sum((gram.scatter_now / gram.scatter_sd) ** 2))
 
         allowed = {}
         for name in {t.name for t in self.trials} & grams.keys():
             gram = grams[name]
             now = point.scatter.get(name, np.zeros_like(gram.scatter_sd))
-            expected = gram.after(step, moved.scatter[name] - now, temper)
-            margin = 1 + JITTER * gram.count / temper + TRUSTED * abs(own(gram) - expected)
+            expected = gram.after(step, moved.scatter[name] - now, inflation)
+            margin = 1 + JITTER * gram.count / inflation + TRUSTED * abs(own(gram) - expected)
             allowed[name] = expected + margin
         scatter = dict(moved.scatter)
         for part in TAKEN_BACK:
@@ -361,10 +361,10 @@ class _Descent:
         return Fit(
             self.coordinates,
             self.point,
-            newton_step(self.coordinates, self.grams, self.point, self.temper).covariance,
+            newton_step(self.coordinates, self.grams, self.point, self.variance_inflation).covariance,
             objective(self.coordinates, self.grams, self.point, 1.0),
             misfit_ratio(self.grams),
-            self.temper,
+            self.variance_inflation,
             self.grams,
             self.done,
             self.converged,

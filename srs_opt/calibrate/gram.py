@@ -52,9 +52,9 @@ class TrialGram:
         return float(self.raw[-1, -1])
 
     def eliminated(
-        self, temper: float = 1.0, held: np.ndarray | None = None, damping: float = 0.0
+        self, inflation: float = 1.0, held: np.ndarray | None = None, damping: float = 0.0
     ) -> Eliminated:
-        """Integrate the scatter out, the noise variance being `temper` times as large.
+        """Integrate the scatter out, the noise variance being `inflation` times as large.
 
         Parameters
         ----------
@@ -64,20 +64,20 @@ class TrialGram:
             Relative, on the scatter's own curvature: a damped step is short in the scatter too.
         """
         if held is not None or damping:
-            return self._eliminate(temper, held, damping)
-        if temper not in self._known:
-            self._known[temper] = self._eliminate(temper, None, 0.0)
-        return self._known[temper]
+            return self._eliminate(inflation, held, damping)
+        if inflation not in self._known:
+            self._known[inflation] = self._eliminate(inflation, None, 0.0)
+        return self._known[inflation]
 
-    def _eliminate(self, temper: float, held: np.ndarray | None, damping: float) -> Eliminated:
+    def _eliminate(self, inflation: float, held: np.ndarray | None, damping: float) -> Eliminated:
         index = np.array(self.scattered, dtype=int)
         precision = self.scatter_sd**-2.0
-        whole = self.raw / temper
+        whole = self.raw / inflation
         inner = whole[np.ix_(index, index)] + np.diag(precision)
         cross = whole[index].copy()
         cross[:, -1] -= self.scatter_now * precision
         log_det = float(np.linalg.slogdet(inner)[1] - np.sum(np.log(precision)))
-        at_point = self.misfit / temper + float(np.sum(self.scatter_now**2 * precision))
+        at_point = self.misfit / inflation + float(np.sum(self.scatter_now**2 * precision))
         matrix = whole.copy()
         matrix[-1, -1] = at_point
         free = np.ones(index.size, dtype=bool)
@@ -95,12 +95,12 @@ class TrialGram:
         matrix -= cross[free].T @ back[free]
         return Eliminated(matrix, at_point, log_det, back)
 
-    def after(self, step: np.ndarray, moved: np.ndarray, temper: float = 1.0) -> float:
+    def after(self, step: np.ndarray, moved: np.ndarray, inflation: float = 1.0) -> float:
         """Return the deviance that the linearisation promises after a step (K,), the scatter moved (B,)."""
         both = np.append(step, -1.0)
         both[list(self.scattered)] += moved
         scatter = (self.scatter_now + moved) / self.scatter_sd
-        return float(both @ self.raw @ both) / temper + float(scatter @ scatter)
+        return float(both @ self.raw @ both) / inflation + float(scatter @ scatter)
 
     def length2(self, step: np.ndarray, moved: np.ndarray) -> float:
         """Return the square of what a step and a move change in the prediction, over the noise's."""
@@ -108,12 +108,12 @@ class TrialGram:
         both[list(self.scattered)] += moved
         return float(both @ self.raw[:-1, :-1] @ both)
 
-    def pull(self, step: np.ndarray, moved: np.ndarray, temper: float = 1.0) -> np.ndarray:
+    def pull(self, step: np.ndarray, moved: np.ndarray, inflation: float = 1.0) -> np.ndarray:
         """Return minus half the gradient of `after` by the scatter (B,): where it is drawn."""
         both = np.append(step, -1.0)
         both[list(self.scattered)] += moved
         back = (self.scatter_now + moved) / self.scatter_sd**2
-        return np.asarray(-(self.raw[list(self.scattered)] @ both) / temper - back)
+        return np.asarray(-(self.raw[list(self.scattered)] @ both) / inflation - back)
 
     def bent(self, ahead: TrialGram, step: np.ndarray, moved: np.ndarray, share: float) -> TrialGram:
         """Return equations whose solution undoes the bend of the prediction along a step and a move.

@@ -32,7 +32,7 @@ def misfit_ratio(grams: Mapping[str, TrialGram]) -> float:
     return sum(g.misfit for g in grams.values()) / sum(g.count for g in grams.values())
 
 
-def temper_of(grams: Mapping[str, TrialGram], correlated: float = CORRELATED) -> float:
+def variance_inflation_of(grams: Mapping[str, TrialGram], correlated: float = CORRELATED) -> float:
     """Return the factor on the noise variance that a misfit calls for.
 
     What a wrong model leaves behind is smooth in time and alike over the markers, so that `correlated` values
@@ -43,20 +43,20 @@ def temper_of(grams: Mapping[str, TrialGram], correlated: float = CORRELATED) ->
 
 
 def objective(
-    coordinates: Sequence[Coordinate], grams: Mapping[str, TrialGram], point: Point, temper: float
+    coordinates: Sequence[Coordinate], grams: Mapping[str, TrialGram], point: Point, inflation: float
 ) -> float:
     """Return -2 log posterior at `point` with the trials' scatter integrated out."""
     precision, offset = priors(coordinates, point)
-    parts = [g.eliminated(temper) for g in grams.values()]
+    parts = [g.eliminated(inflation) for g in grams.values()]
     return float(sum(e.at_point + e.log_det for e in parts) + precision @ offset**2)
 
 
 def within_reach(
-    coordinates: tuple[Coordinate, ...], grams: Mapping[str, TrialGram], point: Point, temper: float = 1.0
+    coordinates: tuple[Coordinate, ...], grams: Mapping[str, TrialGram], point: Point, inflation: float = 1.0
 ) -> float:
     """Return the deviance at the minimum that the linearisation promises."""
-    promised = best_move(coordinates, grams, point, temper, longest=math.inf).promised
-    return objective(coordinates, grams, point, temper) - promised
+    promised = best_move(coordinates, grams, point, inflation, longest=math.inf).promised
+    return objective(coordinates, grams, point, inflation) - promised
 
 
 def excess_of(grams: Mapping[str, TrialGram]) -> float:
@@ -86,7 +86,7 @@ def best_move(
     coordinates: tuple[Coordinate, ...],
     grams: Mapping[str, TrialGram],
     point: Point,
-    temper: float,
+    inflation: float,
     damping: float = 0.0,
     longest: float = LONGEST_LOG_STEP,
 ) -> Move:
@@ -97,19 +97,19 @@ def best_move(
     """
     held: dict[str, np.ndarray] = {}
     for _ in range(HELD):
-        parts = {n: g.eliminated(temper, held.get(n), damping) for n, g in grams.items()}
+        parts = {n: g.eliminated(inflation, held.get(n), damping) for n, g in grams.items()}
         step = _solved(coordinates, [e.matrix for e in parts.values()], point, damping).step
         for k, c in enumerate(coordinates):
             if not c.effect or c.log:
                 step[k] = np.clip(step[k], -longest, longest)
         free = {n: e.back[:, -1] - e.back[:, :-1] @ step for n, e in parts.items()}
         scatter = {n: _within(grams[n], b) for n, b in free.items()}
-        now = {n: _held(grams[n], b, free[n], step, temper) for n, b in scatter.items()}
+        now = {n: _held(grams[n], b, free[n], step, inflation) for n, b in scatter.items()}
         if all(np.array_equal(np.isnan(b), np.isnan(held.get(n, np.nan * b))) for n, b in now.items()):
             break
         held = now
     precision, offset = priors(coordinates, point)
-    promised = sum(parts[n].at_point - g.after(step, scatter[n], temper) for n, g in grams.items())
+    promised = sum(parts[n].at_point - g.after(step, scatter[n], inflation) for n, g in grams.items())
     promised += float(precision @ (offset**2 - (offset + step) ** 2))
     return Move(step, scatter, promised)
 
@@ -119,7 +119,7 @@ def bent_move(
     grams: Mapping[str, TrialGram],
     ahead: Mapping[str, TrialGram],
     point: Point,
-    temper: float,
+    inflation: float,
     damping: float,
     move: Move,
 ) -> Move:
@@ -129,8 +129,8 @@ def bent_move(
     AHEAD of the step leads, with the slopes of the point.
     """
     bent = {n: g.bent(ahead[n], move.step, b, AHEAD) for n, (g, b) in _pairs(grams, move) if ahead[n].stale}
-    parts = {n: g.eliminated(temper, damping=damping) for n, g in bent.items()}
-    rest = [g.eliminated(temper).matrix.copy() for n, g in grams.items() if n not in bent]
+    parts = {n: g.eliminated(inflation, damping=damping) for n, g in bent.items()}
+    rest = [g.eliminated(inflation).matrix.copy() for n, g in grams.items() if n not in bent]
     for matrix in rest:
         matrix[:-1, -1] = matrix[-1, :-1] = 0.0
     free = tuple(replace(c, lower=-math.inf, start=point.values[c.name]) for c in coordinates)
@@ -157,20 +157,20 @@ def _within(gram: TrialGram, moved: np.ndarray) -> np.ndarray:
 
 
 def _held(
-    gram: TrialGram, moved: np.ndarray, free: np.ndarray, step: np.ndarray, temper: float
+    gram: TrialGram, moved: np.ndarray, free: np.ndarray, step: np.ndarray, inflation: float
 ) -> np.ndarray:
     """Return the moves of what leaves its limits, or is held there and drawn further out; else NaN."""
     at = gram.scatter_now + moved
     at_limit = np.abs(at) >= MOST_SCATTER * gram.scatter_sd * (1 - 1e-9)
-    outwards = (moved != free) | (gram.pull(step, moved, temper) * at > 0)
+    outwards = (moved != free) | (gram.pull(step, moved, inflation) * at > 0)
     return np.where(at_limit & outwards, moved, np.nan)
 
 
 def newton_step(
-    coordinates: tuple[Coordinate, ...], grams: Mapping[str, TrialGram], point: Point, temper: float
+    coordinates: tuple[Coordinate, ...], grams: Mapping[str, TrialGram], point: Point, inflation: float
 ) -> Solution:
     """Solve for the step, holding coordinates that would leave their bounds at the bound."""
-    return _solved(coordinates, [g.eliminated(temper).matrix for g in grams.values()], point)
+    return _solved(coordinates, [g.eliminated(inflation).matrix for g in grams.values()], point)
 
 
 def _solved(
@@ -213,6 +213,6 @@ def projected(
     return inverse, total[fitted:, fitted:] - cross.T @ inverse @ cross
 
 
-def sum_eliminated(grams: Mapping[str, TrialGram], temper: float = 1.0) -> np.ndarray:
+def sum_eliminated(grams: Mapping[str, TrialGram], inflation: float = 1.0) -> np.ndarray:
     """Return the sum of the trials' matrices, scatter integrated out."""
-    return np.sum([g.eliminated(temper).matrix for g in grams.values()], axis=0)
+    return np.sum([g.eliminated(inflation).matrix for g in grams.values()], axis=0)

@@ -141,19 +141,19 @@ def candidate_rows(found: Discrepancy) -> list[dict[str, Any]]:
     best: dict[str, Score] = {}
     for score in found.scores:
         best.setdefault(score.candidate.effect, score)
-    temper = found.null.linearisation.temper if found.null else 1.0
+    inflation = found.null.linearisation.variance_inflation if found.null else 1.0
     return [
         {
             "name": name,
-            "improvement": round(score.improvement * temper, 2),
+            "improvement": round(score.improvement * inflation, 2),
             "absorbed_by_calibration": round(score.absorbed, 4),
-            "verdict": _fate(found, score, temper),
+            "verdict": _fate(found, score, inflation),
         }
         for name, score in best.items()
     ]
 
 
-def _fate(found: Discrepancy, score: Score, temper: float) -> str:
+def _fate(found: Discrepancy, score: Score, inflation: float) -> str:
     effect = score.candidate.effect
     selection = found.selection
     if selection and effect in selection.best.names:
@@ -163,7 +163,7 @@ def _fate(found: Discrepancy, score: Score, temper: float) -> str:
         return "cannot be told from the chosen"
     if any(label.split("[")[0] == effect for label in found.tried):
         return "refitted: explains less"
-    if score.improvement < needed_gain(score.candidate, len(found.scores)) and temper == 1.0:
+    if score.improvement < needed_gain(score.candidate, len(found.scores)) and inflation == 1.0:
         return "no evidence"
     return "well behind in the screen"
 

@@ -132,7 +132,7 @@ def _candidates(found: Discrepancy) -> Picture:
     assert found.null is not None
     best: dict[str, float] = {}
     for score in found.scores:
-        gain = score.improvement * found.null.linearisation.temper
+        gain = score.improvement * found.null.linearisation.variance_inflation
         best.setdefault(score.candidate.effect, max(gain, 0.0))
     names = list(best)[::-1]
     figure = _figure(PAGE_IN, 0.5 + 0.17 * len(names))

@@ -62,14 +62,14 @@ class Linearisation:
         How many of them.
     point : Point
     grams : dict
-    temper : float
+    variance_inflation : float
     """
 
     coordinates: tuple[Coordinate, ...]
     fitted: int
     point: Point
     grams: Mapping[str, TrialGram]
-    temper: float
+    variance_inflation: float
 
     def column(self, name: str) -> int:
         """Return the column of a coordinate."""
@@ -88,7 +88,7 @@ def screen(
     """
     size = len(lin.coordinates)
     index = [*range(size), next(iter(lin.grams.values())).raw.shape[0] - 1]
-    total = sum_eliminated(lin.grams, lin.temper)[np.ix_(index, index)]
+    total = sum_eliminated(lin.grams, lin.variance_inflation)[np.ix_(index, index)]
     precision, offset = priors(lin.coordinates, lin.point)
     now = np.array([lin.point.values.get(c.name, 0.0) for c in lin.coordinates])
     lower = np.array([c.lower for c in lin.coordinates]) - now

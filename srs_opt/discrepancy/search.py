@@ -146,7 +146,7 @@ class Search:
         start = start_point(self.base) if start is None else start
         first = self.try_out((), start)
         if first is not None:
-            if first.fit.temper > give_up:
+            if first.fit.variance_inflation > give_up:
                 return first
             start = first.fit.point
         return self.fit((), start, NULL_ITERATIONS, near=ROUGHLY)
@@ -193,7 +193,7 @@ class Search:
     def noise_aware(self, examined: Examined) -> Examined:
         """Return a hypothesis examined anew under smooth errors, if small ones explain what it leaves."""
         now, lin = self.experiment.noise, examined.linearisation
-        if examined.adequate or now.smooth or lin.temper > FAR_OFF:
+        if examined.adequate or now.smooth or lin.variance_inflation > FAR_OFF:
             return examined
         amplitudes = self.functions.amplitudes(self.trials, len(lin.coordinates))
         noise = smooth_part(now, lin.grams, amplitudes, lin.coordinates, lin.point)
@@ -211,9 +211,9 @@ class Search:
         others = [c for k in self.candidates for c in k.sizes if c.name not in names]
         coordinates = (*fit.coordinates, *others)
         point = Point({**{c.name: 0.0 for c in others}, **fit.point.values}, fit.point.scatter)
-        rough = fit.temper > PLAIN
+        rough = fit.variance_inflation > PLAIN
         grams = self.experiment.grams(point, coordinates, self.trials, self.functions, rough=rough)
-        return Linearisation(coordinates, len(fit.coordinates), point, grams, fit.temper)
+        return Linearisation(coordinates, len(fit.coordinates), point, grams, fit.variance_inflation)
 
     def significant(self, score: Score) -> bool:
         """Whether a gain is too large for chance among all candidates."""
@@ -274,7 +274,7 @@ class Search:
     def _polished(self, hypothesis: Hypothesis) -> Hypothesis:
         """Return a hypothesis that explains the data with its fit carried on, where that had not ended."""
         fit = hypothesis.fit
-        if fit.converged or fit.temper > FAR_OFF:
+        if fit.converged or fit.variance_inflation > FAR_OFF:
             return hypothesis
         return self.fit(hypothesis.candidates, fit.point, POLISH) or hypothesis
 
@@ -316,14 +316,11 @@ class Search:
 
     def _proposals(self, current: Examined, depth: int) -> list[Score]:
         """Return the candidates that deserve a refit, best first."""
-        scores = [
-            s
-            for s in current.scores
-            if self.significant(s) or s.improvement * current.linearisation.temper > 60
-        ]
-        if current.hypothesis.fit.temper < FAR_OFF:  # expected sizes can be believed
+        inflation = current.hypothesis.fit.variance_inflation
+        scores = [s for s in current.scores if self.significant(s) or s.improvement * inflation > 60]
+        if inflation < FAR_OFF:  # expected sizes can be believed
             scores = [s for s in scores if s.relative_size >= TELLING]
-        far = current.hypothesis.fit.temper > 1  # nearer, a little bending's slopes hold as all others do
+        far = inflation > 1  # nearer, a little bending's slopes hold as all others do
         leaps = [s for s in current.scores if far and s.candidate.form.effect.bends]
         scores = [s for s in scores if s not in leaps]
         if not scores:
@@ -350,7 +347,7 @@ class Search:
             hypothesis = self.try_out((*have, score.candidate), start, beat)
             if hypothesis is not None:
                 found.append(hypothesis)
-            settled = found and min(h.fit.temper for h in found) == 1
+            settled = found and min(h.fit.variance_inflation for h in found) == 1
             if len(found) >= most and (settled or len(found) >= 2 * most):
                 break
         if not found:

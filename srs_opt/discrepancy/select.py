@@ -44,7 +44,7 @@ def select(best: Hypothesis, fitted: Sequence[Hypothesis], split: Split) -> Sele
     name, without leaving physics or the bench behind, and holds no effect beyond those of a smaller rival.
     Where the best leaves a misfit, differences are judged as if that were noise too.
     """
-    own, reach = best.deviance + 2 * best.parameters, RIVAL * best.fit.temper
+    own, reach = best.deviance + 2 * best.parameters, RIVAL * best.fit.variance_inflation
     near = [
         h
         for h in fitted
@@ -87,7 +87,9 @@ def _predictive(hypotheses: Sequence[Hypothesis], split: Split) -> dict[str, tup
 
 def left_out_deviance(hypothesis: Hypothesis, folds: Sequence[Sequence[str]]) -> np.ndarray:
     """Return every trial's deviance under the fit without its fold (one linear step from the full fit)."""
-    parts = {name: g.eliminated(hypothesis.fit.temper) for name, g in hypothesis.fit.grams.items()}
+    parts = {
+        name: g.eliminated(hypothesis.fit.variance_inflation) for name, g in hypothesis.fit.grams.items()
+    }
     found = []
     for fold in folds:
         step = np.append(_step_without(hypothesis.fit, fold), -1.0)
@@ -100,7 +102,9 @@ def _step_without(fit: Fit, fold: Sequence[str]) -> np.ndarray:
     precision, offset = priors(fit.coordinates, fit.point)
     now = np.array([fit.point.values[c.name] for c in fit.coordinates])
     lower = np.array([c.lower for c in fit.coordinates]) - now
-    rest = np.sum([g.eliminated(fit.temper).matrix for n, g in fit.grams.items() if n not in fold], axis=0)
+    rest = np.sum(
+        [g.eliminated(fit.variance_inflation).matrix for n, g in fit.grams.items() if n not in fold], axis=0
+    )
     return bounded_solve(rest, range(len(fit.coordinates)), precision, offset, lower).step
 
 

@@ -67,7 +67,7 @@ def visible(
     them.
     """
     lin = null.linearisation
-    total = sum_eliminated(lin.grams, lin.temper)
+    total = sum_eliminated(lin.grams, lin.variance_inflation)
     precision, _ = priors(lin.coordinates, lin.point)
     inverse, left = projected(total, lin.fitted, precision, RANK)
     free = {c.name: k for k, c in enumerate(lin.coordinates[lin.fitted :])}
@@ -88,7 +88,9 @@ def visible(
     point = null.hypothesis.fit.point
     count = sum(g.count for g in lin.grams.values())
     needed = max(_needed(c, len(null.scores)) for c in candidates) if candidates else 0.0
-    seen_m = max(needed * experiment.sd_m * float(np.sqrt(lin.temper / count)), settings.negligible_m)
+    seen_m = max(
+        needed * experiment.sd_m * float(np.sqrt(lin.variance_inflation / count)), settings.negligible_m
+    )
     if not played:
         return Visible(seen_m, None, None, tuple(unseen))
     before = experiment.residuals(played, Point(point.values))

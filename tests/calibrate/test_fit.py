@@ -56,7 +56,7 @@ def test_a_converged_fit_has_nothing_left_to_gain_however_many_data(count, wrong
     measured = Curved(count, wrong)
     found = fit(measured, COORDINATES, Point({"size.of_it": 0.8, "width.of_it": 0.5}), iterations=100)
     assert found.converged
-    assert found.temper == 1
+    assert found.variance_inflation == 1
     grams = measured.grams(found.point, COORDINATES)
     now = objective(COORDINATES, grams, found.point, 1.0)
     assert now - within_reach(COORDINATES, grams, found.point) < CONVERGED
