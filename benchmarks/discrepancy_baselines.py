@@ -21,7 +21,7 @@ def baselines(found: Discrepancy) -> dict[str, list[str]]:
     fitted = lin.coordinates[: lin.fitted]
     others = lin.coordinates[lin.fitted :]
     start = Point({**start_point(fitted).values, **{c.name: 0.0 for c in others}})
-    bench = found.experiment.grams(start, lin.coordinates, found.split.open)
+    bench = found.experiment.normal_equations(start, lin.coordinates, found.split.open)
     raw = np.sum([g.raw for g in bench.values()], axis=0)
     return {
         "nearest_shape": _nearest(raw, lin),
@@ -43,8 +43,8 @@ def _forward(found: Discrepancy) -> list[str]:
     assert found.null is not None
     lin = found.null.linearisation
     size = len(lin.coordinates)
-    index = [*range(size), next(iter(lin.grams.values())).raw.shape[0] - 1]
-    total = sum_eliminated(lin.grams)[np.ix_(index, index)]
+    index = [*range(size), next(iter(lin.equations.values())).raw.shape[0] - 1]
+    total = sum_eliminated(lin.equations)[np.ix_(index, index)]
     precision, offset = priors(lin.coordinates, lin.point)
     total[np.arange(size), np.arange(size)] += precision
     total[:size, -1] -= precision * offset

@@ -107,7 +107,7 @@ def _fitted(sizes: list[int]) -> dict[str, Curve]:
         trials = [replace(t, name=f"t{k}") for k, t in zip(range(size), itertools.cycle(dataset.trials))]
         costs.append(
             best_time(  # a new experiment each time: nothing is known of its trials
-                lambda: sum_eliminated(Experiment(model, trials, 0.001).grams(point, base)),  # noqa: B023
+                lambda: sum_eliminated(Experiment(model, trials, 0.001).normal_equations(point, base)),  # noqa: B023
                 2 if size <= 100 else 1,
             )
         )

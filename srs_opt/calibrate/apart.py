@@ -27,15 +27,15 @@ def own_scatter(experiment: Experiment, fit: Fit, trials: Sequence[Trial]) -> Po
     own = _own(fit)
     point = Point(fit.point.values, {})
     for _ in range(3):
-        grams = experiment.grams(point, own, trials)
+        equations = experiment.normal_equations(point, own, trials)
         moved, settled = {}, True
         for trial in trials:
-            gram = grams[trial.name]
-            excess = gram.misfit / gram.count - 1 - 4 * np.sqrt(2 / gram.count)
-            back = gram.eliminated(1 + CORRELATED * max(0.0, excess)).back
+            normal = equations[trial.name]
+            excess = normal.misfit / normal.count - 1 - 4 * np.sqrt(2 / normal.count)
+            back = normal.eliminated(1 + CORRELATED * max(0.0, excess)).back
             now = point.scatter.get(trial.name, np.zeros(back.shape[0]))
-            moved[trial.name] = np.clip(now + back[:, -1], -4 * gram.scatter_sd, 4 * gram.scatter_sd)
-            settled &= bool(np.abs(moved[trial.name] - now).max() < 0.05 * gram.scatter_sd.min())
+            moved[trial.name] = np.clip(now + back[:, -1], -4 * normal.scatter_sd, 4 * normal.scatter_sd)
+            settled &= bool(np.abs(moved[trial.name] - now).max() < 0.05 * normal.scatter_sd.min())
         if settled:
             break
         point = Point(fit.point.values, moved)
@@ -59,7 +59,9 @@ def stands_apart(
     aside: dict[str, str] = {}
     for _ in range(max(1, len(trials) // 4)):
         rest = [t for t in trials if t.name not in aside]
-        misfit = {t.name: fit.grams[t.name].misfit / max(fit.grams[t.name].count, 1) - 1 for t in rest}
+        misfit = {
+            t.name: fit.equations[t.name].misfit / max(fit.equations[t.name].count, 1) - 1 for t in rest
+        }
         worst = max(rest, key=lambda t: misfit[t.name])
         usual = float(np.median(list(misfit.values())))
         if len(rest) <= LEAST_LEFT or misfit[worst.name] < max(NOTABLE, WORST * usual):
@@ -67,10 +69,12 @@ def stands_apart(
         without = refit([*aside, worst.name])
         if without is None:
             break
-        others = [g for n, g in without.grams.items() if n != worst.name and g.scattered]
+        others = [g for n, g in without.equations.items() if n != worst.name and g.scattered]
         known = max(max(g.misfit / max(g.count, 1) - 1 for g in others), NOTABLE / APART)
-        gram = experiment.grams(own_scatter(experiment, without, [worst]), _own(without), [worst])[worst.name]
-        off = gram.misfit / max(gram.count, 1) - 1
+        normal = experiment.normal_equations(
+            own_scatter(experiment, without, [worst]), _own(without), [worst]
+        )[worst.name]
+        off = normal.misfit / max(normal.count, 1) - 1
         if off < APART * known:
             break
         miss, most = (1e3 * experiment.sd_m * np.sqrt(v) for v in (off, known))

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from srs_opt.calibrate.coordinates import Coordinate
-from srs_opt.calibrate.gram import TrialGram
-from srs_opt.calibrate.instruments import NAME, reading_gram, readings
+from srs_opt.calibrate.instruments import NAME, reading_equations, readings
 from srs_opt.calibrate.model import Model
 from srs_opt.calibrate.noise import Noise, track_of
 from srs_opt.calibrate.nominal import tolerance_for
+from srs_opt.calibrate.normal_equations import NormalEquations
 from srs_opt.calibrate.trials import Extra, Point, Request, Trials
 from srs_opt.errors import NoAnswerError
 from srs_opt.measurement.records import Bench, Trial
@@ -93,7 +93,7 @@ class Experiment:
         """
         return list(self._ask(trials, Request(point)).values())
 
-    def grams(
+    def normal_equations(
         self,
         point: Point,
         coordinates: Sequence[Coordinate],
@@ -102,7 +102,7 @@ class Experiment:
         *,
         stale: bool = False,
         rough: bool = False,
-    ) -> dict[str, TrialGram]:
+    ) -> dict[str, NormalEquations]:
         """Return the Gram matrices of several trials.
 
         With `stale` the slopes may be those of the last request for the same coordinates, which costs a
@@ -116,10 +116,10 @@ class Experiment:
         """
         stale = stale and self.keeps and extra is None
         request = Request(point, tuple(coordinates), extra, stale, rough, self.noise)
-        found: dict[str, TrialGram] = self._ask(self.trials if trials is None else trials, request)
+        found: dict[str, NormalEquations] = self._ask(self.trials if trials is None else trials, request)
         if self.readings and found:
             further = next(iter(found.values())).raw.shape[0] - 1 - len(coordinates)
-            found[NAME] = reading_gram(self.readings, point.values, coordinates, further)
+            found[NAME] = reading_equations(self.readings, point.values, coordinates, further)
         return found
 
 

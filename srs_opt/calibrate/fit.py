@@ -11,7 +11,7 @@ import numpy as np
 
 from srs_opt.calibrate.coordinates import Coordinate
 from srs_opt.calibrate.experiment import Point
-from srs_opt.calibrate.gram import TrialGram
+from srs_opt.calibrate.normal_equations import NormalEquations
 from srs_opt.calibrate.objective import (
     AHEAD,
     CORRELATED,
@@ -54,7 +54,7 @@ class Measured(Protocol):
     def trials(self) -> Sequence[Trial]:
         """Return all that there are."""
 
-    def grams(
+    def normal_equations(
         self,
         point: Point,
         coordinates: Sequence[Coordinate],
@@ -62,7 +62,7 @@ class Measured(Protocol):
         *,
         stale: bool = False,
         rough: bool = False,
-    ) -> dict[str, TrialGram]:
+    ) -> dict[str, NormalEquations]:
         """Return the normal equations at `point`, by trial.
 
         `stale` allows slopes of an earlier point, `rough` motions that are good enough for a plain misfit.
@@ -85,8 +85,8 @@ class Fit:
         Sum of squared residuals over its expectation under noise alone.
     variance_inflation : float
         By how much the noise variance was raised in the fit because the model does not explain the data.
-    grams : dict
-        Trial name -> TrialGram at the point.
+    equations : dict
+        Trial name -> NormalEquations at the point.
     iterations : int
     converged : bool
         Whether the linearisation at the point promises to gain next to nothing, all trials asked.
@@ -100,7 +100,7 @@ class Fit:
     deviance: float
     misfit_ratio: float
     variance_inflation: float
-    grams: dict[str, TrialGram]
+    equations: dict[str, NormalEquations]
     iterations: int
     converged: bool
     start_misfit_ratio: float = math.nan
@@ -173,7 +173,7 @@ def fit(
         if descent.hopeless(beat):
             break
         if report is not None:
-            report(f"misfit {sum(g.misfit for g in descent.grams.values()):.0f}")
+            report(f"misfit {sum(g.misfit for g in descent.equations.values()):.0f}")
     return descent.end(rough=rough)
 
 
@@ -199,43 +199,47 @@ class _Descent:
         """Linearise where the fit starts."""
         self.point = point
         self.refresh()
-        self.at_start = misfit_ratio(self.grams)
+        self.at_start = misfit_ratio(self.equations)
 
     def refresh(self) -> None:
         """Take the slopes anew, from a fine simulation once the misfit does not hide a rough one."""
-        self.grams = self._measured(self.point)
+        self.equations = self._measured(self.point)
         if self.rough and self.variance_inflation <= PLAIN:
             self.rough = False
-            self.grams = self._measured(self.point)
+            self.equations = self._measured(self.point)
 
     def _measured(
         self, point: Point, trials: Sequence[Trial] | None = None, *, stale: bool = False
-    ) -> dict[str, TrialGram]:
+    ) -> dict[str, NormalEquations]:
         some = self.trials if trials is None else trials
-        return self.experiment.grams(point, self.coordinates, some, stale=stale, rough=self.rough)
+        return self.experiment.normal_equations(point, self.coordinates, some, stale=stale, rough=self.rough)
 
     @property
     def stale(self) -> bool:
         """Whether slopes are those of an earlier point."""
-        return any(g.stale for g in self.grams.values())
+        return any(g.stale for g in self.equations.values())
 
     @property
     def variance_inflation(self) -> float:
         """Factor on the noise variance."""
-        return variance_inflation_of(self.grams, self.correlated)
+        return variance_inflation_of(self.equations, self.correlated)
 
     @property
     def jitter(self) -> float:
         """Deviance below which a loss is the integration's."""
-        return max(CONVERGED, JITTER * sum(g.count for g in self.grams.values()) / self.variance_inflation)
+        return max(
+            CONVERGED, JITTER * sum(g.count for g in self.equations.values()) / self.variance_inflation
+        )
 
     def now(self) -> float:
         """Return the objective at the point."""
-        return objective(self.coordinates, self.grams, self.point, self.variance_inflation)
+        return objective(self.coordinates, self.equations, self.point, self.variance_inflation)
 
     def missing(self) -> float:
         """Return what the linearisation promises to gain."""
-        return self.now() - within_reach(self.coordinates, self.grams, self.point, self.variance_inflation)
+        return self.now() - within_reach(
+            self.coordinates, self.equations, self.point, self.variance_inflation
+        )
 
     def arrived(self) -> bool:
         """Whether fresh slopes promise to gain next to nothing."""
@@ -243,9 +247,9 @@ class _Descent:
             enough, inflation = CONVERGED, self.variance_inflation
             if inflation > FAR_OFF:
                 near = max(self.near, PLAINLY) if inflation > PLAIN else self.near
-                enough = max(CONVERGED, near * excess_of(self.grams) / inflation)
+                enough = max(CONVERGED, near * excess_of(self.equations) / inflation)
             if self.stale:
-                enough = max(enough, CRAWL * excess_of(self.grams) / inflation)
+                enough = max(enough, CRAWL * excess_of(self.equations) / inflation)
             if self.missing() >= enough:
                 return False
             if not self.stale:
@@ -264,20 +268,20 @@ class _Descent:
         """Go on where that gains, else take fresh slopes or damp the next step."""
         self.done += 1
         stale, inflation, now, jitter = self.stale, self.variance_inflation, self.now(), self.jitter
-        move = best_move(self.coordinates, self.grams, self.point, inflation, self.damping)
+        move = best_move(self.coordinates, self.equations, self.point, inflation, self.damping)
         try:
             if self.winding and self.bends and not stale:
                 move = self._bent(move)
             moved = _moved(self.point, self.coordinates, move)
-            grams = self._measured(moved, stale=True)
-            before, after = (self.point, self.grams), (moved, grams)
+            equations = self._measured(moved, stale=True)
+            before, after = (self.point, self.equations), (moved, equations)
             moved = self._tamed(before, after, inflation)
-            gain = now - objective(self.coordinates, grams, moved, inflation)
+            gain = now - objective(self.coordinates, equations, moved, inflation)
         except NoAnswerError:
             gain = -math.inf
         if gain > -jitter:
             self.idle = self.idle + 1 if gain < CONVERGED and self.damping < 1 and not stale else 0
-            self.point, self.grams = moved, grams
+            self.point, self.equations = moved, equations
             self._ease(gain, move.promised)
             off = abs(gain - move.promised) > TRUSTED * move.promised
             self.winding = off
@@ -303,13 +307,13 @@ class _Descent:
         there = _moved(self.point, self.coordinates, short)
         ahead = self._measured(there, stale=True)
         self.bends = any(g.stale for g in ahead.values())
-        own = self.coordinates, self.grams, ahead, self.point, self.variance_inflation, self.damping
+        own = self.coordinates, self.equations, ahead, self.point, self.variance_inflation, self.damping
         return bent_move(*own, move) if self.bends else move
 
     def _tamed(
         self,
-        before: tuple[Point, Mapping[str, TrialGram]],
-        after: tuple[Point, dict[str, TrialGram]],
+        before: tuple[Point, Mapping[str, NormalEquations]],
+        after: tuple[Point, dict[str, NormalEquations]],
         inflation: float,
     ) -> Point:
         """Return the new point with the scatter of trials that went astray taken back; their matrices follow.
@@ -317,38 +321,38 @@ class _Descent:
         A trial's scatter is its own affair: one near a change of its gait, which follows far less linearly
         than the others, must not hold up the fit to all.
         """
-        (point, grams), (moved, new_grams) = before, after
+        (point, equations), (moved, new_equations) = before, after
         step = np.array([moved.values[c.name] - point.values[c.name] for c in self.coordinates])
 
-        def own(gram: TrialGram) -> float:
-            return gram.misfit / inflation + float(np.sum((gram.scatter_now / gram.scatter_sd) ** 2))
+        def own(normal: NormalEquations) -> float:
+            return normal.misfit / inflation + float(np.sum((normal.scatter_now / normal.scatter_sd) ** 2))
 
         allowed = {}
-        for name in {t.name for t in self.trials} & grams.keys():
-            gram = grams[name]
-            now = point.scatter.get(name, np.zeros_like(gram.scatter_sd))
-            expected = gram.after(step, moved.scatter[name] - now, inflation)
-            margin = 1 + JITTER * gram.count / inflation + TRUSTED * abs(own(gram) - expected)
+        for name in {t.name for t in self.trials} & equations.keys():
+            normal = equations[name]
+            now = point.scatter.get(name, np.zeros_like(normal.scatter_sd))
+            expected = normal.after(step, moved.scatter[name] - now, inflation)
+            margin = 1 + JITTER * normal.count / inflation + TRUSTED * abs(own(normal) - expected)
             allowed[name] = expected + margin
         scatter = dict(moved.scatter)
         for part in TAKEN_BACK:
             known = [t for t in self.trials if t.name in allowed]
-            astray = [t for t in known if own(new_grams[t.name]) > allowed[t.name]]
+            astray = [t for t in known if own(new_equations[t.name]) > allowed[t.name]]
             if not 0 < len(astray) <= len(allowed) // FEW_ASTRAY:
                 break
             tried = dict(scatter)
             for t in astray:
-                now = point.scatter.get(t.name, np.zeros_like(grams[t.name].scatter_sd))
+                now = point.scatter.get(t.name, np.zeros_like(equations[t.name].scatter_sd))
                 tried[t.name] = now + part * (moved.scatter[t.name] - now)
             found = self._measured(Point(moved.values, tried), astray, stale=True)
             for t in astray:
-                if own(found[t.name]) < own(new_grams[t.name]):
-                    new_grams[t.name], scatter[t.name] = found[t.name], tried[t.name]
+                if own(found[t.name]) < own(new_equations[t.name]):
+                    new_equations[t.name], scatter[t.name] = found[t.name], tried[t.name]
         return Point(moved.values, scatter)
 
     def hopeless(self, beat: float) -> bool:
         """Whether the fit stays far behind the one to beat, and does not catch up."""
-        excess = within_reach(self.coordinates, self.grams, self.point) - beat
+        excess = within_reach(self.coordinates, self.equations, self.point) - beat
         far = max(HOPELESS, HOPELESS_SHARE * abs(beat)) if math.isfinite(beat) else math.inf
         late = self.done >= TRIED and excess > far and excess > 0.5 * self.behind
         self.behind = excess
@@ -361,11 +365,11 @@ class _Descent:
         return Fit(
             self.coordinates,
             self.point,
-            newton_step(self.coordinates, self.grams, self.point, self.variance_inflation).covariance,
-            objective(self.coordinates, self.grams, self.point, 1.0),
-            misfit_ratio(self.grams),
+            newton_step(self.coordinates, self.equations, self.point, self.variance_inflation).covariance,
+            objective(self.coordinates, self.equations, self.point, 1.0),
+            misfit_ratio(self.equations),
             self.variance_inflation,
-            self.grams,
+            self.equations,
             self.done,
             self.converged,
             self.at_start,

@@ -11,8 +11,8 @@ import casadi as ca
 import numpy as np
 
 from srs_opt.calibrate.coordinates import SCATTER_SD, Coordinate
-from srs_opt.calibrate.gram import TrialGram
 from srs_opt.calibrate.model import Conditions, Model, Values
+from srs_opt.calibrate.normal_equations import NormalEquations
 from srs_opt.measurement.records import Bench, Check, TowTest
 from srs_opt.model.compliant import CompliantModel
 from srs_opt.model.effects import known_effects
@@ -144,9 +144,9 @@ def _tow_force(structure: Structure) -> ca.Function:
     return ca.Function("tow", [speed, parameters.vector], [total])
 
 
-def reading_gram(
+def reading_equations(
     found: Sequence[Reading], values: Values, coordinates: Sequence[Coordinate], extra: int
-) -> TrialGram:
+) -> NormalEquations:
     """Return the readings' normal equations over `coordinates` and `extra` columns that they do not touch."""
     rows = np.zeros((len(found), len(coordinates) + extra + 1))
     now = {**{c.name: c.start for c in coordinates}, **values}
@@ -157,4 +157,4 @@ def reading_gram(
             ends = [reading.expected({**now, c.name: now[c.name] + s * h}) for s in (1, -1)]
             rows[i, k] = (ends[0] - ends[1]) / (2 * h) / reading.sd
     none = np.zeros(0)
-    return TrialGram(rows.T @ rows, len(found), (), none, none)
+    return NormalEquations(rows.T @ rows, len(found), (), none, none)

@@ -12,8 +12,8 @@ from srs_opt.calibrate.coordinates import SCATTER_SD, Coordinate, base_coordinat
 from srs_opt.calibrate.experiment import Experiment, Point
 from srs_opt.calibrate.fit import fit, start_point
 from srs_opt.calibrate.forms import form_of_entry
-from srs_opt.calibrate.gram import TrialGram, solve
 from srs_opt.calibrate.model import Model
+from srs_opt.calibrate.normal_equations import NormalEquations, solve
 from srs_opt.calibrate.objective import priors, sum_eliminated
 from srs_opt.calibrate.result import Calibration, calibration
 from srs_opt.errors import NoAnswerError
@@ -79,7 +79,7 @@ class Maps:
         own = _own_variance(self.rows, spread)
         self._whitening = {k: np.linalg.inv(_root(row, spread[k], own)) for k, row in self.rows.items()}
 
-    def grams(
+    def normal_equations(
         self,
         point: Point,
         coordinates: Sequence[Coordinate],
@@ -87,7 +87,7 @@ class Maps:
         *,
         stale: bool = False,
         rough: bool = False,
-    ) -> dict[str, TrialGram]:
+    ) -> dict[str, NormalEquations]:
         """Return the normal equations of every row, the slopes always fresh and the orbits fine.
 
         Raises
@@ -103,7 +103,7 @@ class Maps:
                 raise NoAnswerError(f"row {k + 1} of the maps has no steady state with these parameters")
             value, slopes = paths[k]
             both = self._whitening[k] @ np.column_stack([slopes, _measured(row) - value])
-            found[f"map row {k + 1}"] = TrialGram(both.T @ both, 2, (), none, none)
+            found[f"map row {k + 1}"] = NormalEquations(both.T @ both, 2, (), none, none)
         return found
 
     def _paths(
@@ -226,7 +226,7 @@ def _sd_with_tracks(
         for k, row in enumerate(rows)
     ]  # fmt: skip
     experiment = Experiment(Model(dataset.robot, model), trials, dataset.marker_sd_m)
-    total = sum_eliminated(experiment.grams(point, base)) * (len(dataset.maps) / len(rows))
+    total = sum_eliminated(experiment.normal_equations(point, base)) * (len(dataset.maps) / len(rows))
     covariance = solve(total, range(len(base)), *priors(base, point)).covariance
     size = {
         c.name: 1.0 if c.effect else getattr(dataset.robot, c.name) * math.exp(point.values[c.name])

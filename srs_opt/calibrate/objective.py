@@ -10,7 +10,7 @@ import numpy as np
 
 from srs_opt.calibrate.coordinates import Coordinate
 from srs_opt.calibrate.experiment import Point
-from srs_opt.calibrate.gram import Solution, TrialGram, bounded_solve
+from srs_opt.calibrate.normal_equations import NormalEquations, Solution, bounded_solve
 
 CORRELATED = 100.0  # values of a track that a smooth misfit makes count as one
 LONGEST_LOG_STEP = 0.7
@@ -27,41 +27,47 @@ def priors(coordinates: Sequence[Coordinate], point: Point) -> tuple[np.ndarray,
     return precision, offset
 
 
-def misfit_ratio(grams: Mapping[str, TrialGram]) -> float:
+def misfit_ratio(equations: Mapping[str, NormalEquations]) -> float:
     """Return the sum of squared residuals over its expectation under noise alone."""
-    return sum(g.misfit for g in grams.values()) / sum(g.count for g in grams.values())
+    return sum(g.misfit for g in equations.values()) / sum(g.count for g in equations.values())
 
 
-def variance_inflation_of(grams: Mapping[str, TrialGram], correlated: float = CORRELATED) -> float:
+def variance_inflation_of(equations: Mapping[str, NormalEquations], correlated: float = CORRELATED) -> float:
     """Return the factor on the noise variance that a misfit calls for.
 
     What a wrong model leaves behind is smooth in time and alike over the markers, so that `correlated` values
     count as one; without this, thousands of frames would pull the parameters far from their bench values.
     """
-    count, ratio = sum(g.count for g in grams.values()), misfit_ratio(grams)
+    count, ratio = sum(g.count for g in equations.values()), misfit_ratio(equations)
     return 1 + correlated * max(0.0, ratio - 1 - 4 * math.sqrt(2 / count))
 
 
 def objective(
-    coordinates: Sequence[Coordinate], grams: Mapping[str, TrialGram], point: Point, inflation: float
+    coordinates: Sequence[Coordinate],
+    equations: Mapping[str, NormalEquations],
+    point: Point,
+    inflation: float,
 ) -> float:
     """Return -2 log posterior at `point` with the trials' scatter integrated out."""
     precision, offset = priors(coordinates, point)
-    parts = [g.eliminated(inflation) for g in grams.values()]
+    parts = [g.eliminated(inflation) for g in equations.values()]
     return float(sum(e.at_point + e.log_det for e in parts) + precision @ offset**2)
 
 
 def within_reach(
-    coordinates: tuple[Coordinate, ...], grams: Mapping[str, TrialGram], point: Point, inflation: float = 1.0
+    coordinates: tuple[Coordinate, ...],
+    equations: Mapping[str, NormalEquations],
+    point: Point,
+    inflation: float = 1.0,
 ) -> float:
     """Return the deviance at the minimum that the linearisation promises."""
-    promised = best_move(coordinates, grams, point, inflation, longest=math.inf).promised
-    return objective(coordinates, grams, point, inflation) - promised
+    promised = best_move(coordinates, equations, point, inflation, longest=math.inf).promised
+    return objective(coordinates, equations, point, inflation) - promised
 
 
-def excess_of(grams: Mapping[str, TrialGram]) -> float:
+def excess_of(equations: Mapping[str, NormalEquations]) -> float:
     """Return the misfit beyond what noise leaves."""
-    return sum(max(g.misfit - g.count, 0.0) for g in grams.values())
+    return sum(max(g.misfit - g.count, 0.0) for g in equations.values())
 
 
 @dataclass(frozen=True)
@@ -84,7 +90,7 @@ class Move:
 
 def best_move(
     coordinates: tuple[Coordinate, ...],
-    grams: Mapping[str, TrialGram],
+    equations: Mapping[str, NormalEquations],
     point: Point,
     inflation: float,
     damping: float = 0.0,
@@ -97,27 +103,27 @@ def best_move(
     """
     held: dict[str, np.ndarray] = {}
     for _ in range(HELD):
-        parts = {n: g.eliminated(inflation, held.get(n), damping) for n, g in grams.items()}
+        parts = {n: g.eliminated(inflation, held.get(n), damping) for n, g in equations.items()}
         step = _solved(coordinates, [e.matrix for e in parts.values()], point, damping).step
         for k, c in enumerate(coordinates):
             if not c.effect or c.log:
                 step[k] = np.clip(step[k], -longest, longest)
         free = {n: e.back[:, -1] - e.back[:, :-1] @ step for n, e in parts.items()}
-        scatter = {n: _within(grams[n], b) for n, b in free.items()}
-        now = {n: _held(grams[n], b, free[n], step, inflation) for n, b in scatter.items()}
+        scatter = {n: _within(equations[n], b) for n, b in free.items()}
+        now = {n: _held(equations[n], b, free[n], step, inflation) for n, b in scatter.items()}
         if all(np.array_equal(np.isnan(b), np.isnan(held.get(n, np.nan * b))) for n, b in now.items()):
             break
         held = now
     precision, offset = priors(coordinates, point)
-    promised = sum(parts[n].at_point - g.after(step, scatter[n], inflation) for n, g in grams.items())
+    promised = sum(parts[n].at_point - g.after(step, scatter[n], inflation) for n, g in equations.items())
     promised += float(precision @ (offset**2 - (offset + step) ** 2))
     return Move(step, scatter, promised)
 
 
 def bent_move(
     coordinates: tuple[Coordinate, ...],
-    grams: Mapping[str, TrialGram],
-    ahead: Mapping[str, TrialGram],
+    equations: Mapping[str, NormalEquations],
+    ahead: Mapping[str, NormalEquations],
     point: Point,
     inflation: float,
     damping: float,
@@ -128,49 +134,56 @@ def bent_move(
     After Transtrum and Sethna (2012), doi 10.48550/arXiv.1201.5885. `ahead` are the normal equations where
     AHEAD of the step leads, with the slopes of the point.
     """
-    bent = {n: g.bent(ahead[n], move.step, b, AHEAD) for n, (g, b) in _pairs(grams, move) if ahead[n].stale}
+    bent = {
+        n: g.bent(ahead[n], move.step, b, AHEAD) for n, (g, b) in _pairs(equations, move) if ahead[n].stale
+    }
     parts = {n: g.eliminated(inflation, damping=damping) for n, g in bent.items()}
-    rest = [g.eliminated(inflation).matrix.copy() for n, g in grams.items() if n not in bent]
+    rest = [g.eliminated(inflation).matrix.copy() for n, g in equations.items() if n not in bent]
     for matrix in rest:
         matrix[:-1, -1] = matrix[-1, :-1] = 0.0
     free = tuple(replace(c, lower=-math.inf, start=point.values[c.name]) for c in coordinates)
     turn = _solved(free, [*(e.matrix for e in parts.values()), *rest], point, damping).step
     turns = {n: e.back[:, -1] - e.back[:, :-1] @ turn for n, e in parts.items()}
     length, size = (
-        math.sqrt(sum(g.length2(s, b[n]) for n, g in grams.items() if n in bent))
+        math.sqrt(sum(g.length2(s, b[n]) for n, g in equations.items() if n in bent))
         for s, b in ((move.step, move.scatter), (turn, turns))
     )
     share = 0.5 * min(1.0, MOST_BEND * length / max(size, 1e-300))
     lower = np.array([c.lower - point.values[c.name] for c in coordinates])
     step = np.maximum(move.step + share * turn, lower)
-    scatter = {n: _within(grams[n], b + share * turns.get(n, 0.0)) for n, b in move.scatter.items()}
+    scatter = {n: _within(equations[n], b + share * turns.get(n, 0.0)) for n, b in move.scatter.items()}
     return Move(step, scatter, move.promised)
 
 
-def _pairs(grams: Mapping[str, TrialGram], move: Move) -> Iterable[tuple[str, tuple[TrialGram, np.ndarray]]]:
-    return ((n, (g, move.scatter[n])) for n, g in grams.items())
+def _pairs(
+    equations: Mapping[str, NormalEquations], move: Move
+) -> Iterable[tuple[str, tuple[NormalEquations, np.ndarray]]]:
+    return ((n, (g, move.scatter[n])) for n, g in equations.items())
 
 
-def _within(gram: TrialGram, moved: np.ndarray) -> np.ndarray:
-    limit = MOST_SCATTER * gram.scatter_sd
-    return np.asarray(np.clip(gram.scatter_now + moved, -limit, limit) - gram.scatter_now)
+def _within(normal: NormalEquations, moved: np.ndarray) -> np.ndarray:
+    limit = MOST_SCATTER * normal.scatter_sd
+    return np.asarray(np.clip(normal.scatter_now + moved, -limit, limit) - normal.scatter_now)
 
 
 def _held(
-    gram: TrialGram, moved: np.ndarray, free: np.ndarray, step: np.ndarray, inflation: float
+    normal: NormalEquations, moved: np.ndarray, free: np.ndarray, step: np.ndarray, inflation: float
 ) -> np.ndarray:
     """Return the moves of what leaves its limits, or is held there and drawn further out; else NaN."""
-    at = gram.scatter_now + moved
-    at_limit = np.abs(at) >= MOST_SCATTER * gram.scatter_sd * (1 - 1e-9)
-    outwards = (moved != free) | (gram.pull(step, moved, inflation) * at > 0)
+    at = normal.scatter_now + moved
+    at_limit = np.abs(at) >= MOST_SCATTER * normal.scatter_sd * (1 - 1e-9)
+    outwards = (moved != free) | (normal.pull(step, moved, inflation) * at > 0)
     return np.where(at_limit & outwards, moved, np.nan)
 
 
 def newton_step(
-    coordinates: tuple[Coordinate, ...], grams: Mapping[str, TrialGram], point: Point, inflation: float
+    coordinates: tuple[Coordinate, ...],
+    equations: Mapping[str, NormalEquations],
+    point: Point,
+    inflation: float,
 ) -> Solution:
     """Solve for the step, holding coordinates that would leave their bounds at the bound."""
-    return _solved(coordinates, [g.eliminated(inflation).matrix for g in grams.values()], point)
+    return _solved(coordinates, [g.eliminated(inflation).matrix for g in equations.values()], point)
 
 
 def _solved(
@@ -213,6 +226,6 @@ def projected(
     return inverse, total[fitted:, fitted:] - cross.T @ inverse @ cross
 
 
-def sum_eliminated(grams: Mapping[str, TrialGram], inflation: float = 1.0) -> np.ndarray:
+def sum_eliminated(equations: Mapping[str, NormalEquations], inflation: float = 1.0) -> np.ndarray:
     """Return the sum of the trials' matrices, scatter integrated out."""
-    return np.sum([g.eliminated(inflation).matrix for g in grams.values()], axis=0)
+    return np.sum([g.eliminated(inflation).matrix for g in equations.values()], axis=0)

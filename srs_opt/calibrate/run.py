@@ -114,11 +114,13 @@ def _noise_left(experiment: Experiment, found: Fit, trials: Sequence[Trial]) -> 
     """Return the noise that a fit's residuals show, smooth errors only if they explain all that is left."""
     first = len(found.coordinates)
     noise = coloured(experiment.noise, trials, experiment.residuals(trials, found.point))
-    grams = experiment.with_noise(noise).grams(found.point, found.coordinates, trials, unit_terms)
-    columns = range(first, next(iter(grams.values())).raw.shape[0] - 1)
+    equations = experiment.with_noise(noise).normal_equations(
+        found.point, found.coordinates, trials, unit_terms
+    )
+    columns = range(first, next(iter(equations.values())).raw.shape[0] - 1)
     units = [dict.fromkeys(some, 1.0) for some in (columns[:DRIFTS], columns[DRIFTS:])]
     amplitudes = {t.name: Amplitudes(*units) for t in trials}
-    return smooth_part(noise, grams, amplitudes, found.coordinates, found.point)
+    return smooth_part(noise, equations, amplitudes, found.coordinates, found.point)
 
 
 def going_on_from(dataset: DataSet, robot: Robot) -> DataSet:

@@ -15,8 +15,8 @@ import numpy as np
 
 from srs_opt.calibrate.coordinates import Coordinate
 from srs_opt.calibrate.experiment import Point
-from srs_opt.calibrate.gram import TrialGram, solve
 from srs_opt.calibrate.noise import Noise
+from srs_opt.calibrate.normal_equations import NormalEquations, solve
 from srs_opt.calibrate.objective import priors
 
 # m. The largest is what still counts as an error of the camera's and not as a discovery: twice as much would
@@ -51,7 +51,7 @@ class Amplitudes:
 
 def smooth_part(
     noise: Noise,
-    grams: Mapping[str, TrialGram],
+    equations: Mapping[str, NormalEquations],
     amplitudes: Mapping[str, Amplitudes],
     coordinates: Sequence[Coordinate],
     point: Point,
@@ -60,7 +60,7 @@ def smooth_part(
 
     Parameters
     ----------
-    grams : dict
+    equations : dict
         Under `noise`, which is to have no smooth part, with columns for the amplitudes.
     amplitudes : dict
         By trial; those of trials that are not named have none.
@@ -73,9 +73,9 @@ def smooth_part(
     loose = np.array([LOOSE * c.typical for c in coordinates])
     precision = np.where(precision > 0, precision, loose**-2.0)
     free = range(len(coordinates))
-    count = sum(g.count for g in grams.values())
+    count = sum(g.count for g in equations.values())
     tried = {
-        (drift, systematic): _deviance(grams, amplitudes, (drift, systematic), free, precision, offset)
+        (drift, systematic): _deviance(equations, amplitudes, (drift, systematic), free, precision, offset)
         for drift in DRIFTS_M
         for systematic in SYSTEMATIC_M
     }
@@ -89,7 +89,7 @@ def smooth_part(
 
 
 def _deviance(
-    grams: Mapping[str, TrialGram],
+    equations: Mapping[str, NormalEquations],
     amplitudes: Mapping[str, Amplitudes],
     sizes_m: tuple[float, float],
     free: Sequence[int],
@@ -98,9 +98,9 @@ def _deviance(
 ) -> tuple[float, float]:
     """Return the misfit and the log determinants of -2 log restricted likelihood."""
     total, log_det = np.zeros(()), 0.0
-    for name, gram in grams.items():
+    for name, normal in equations.items():
         own = amplitudes[name].sizes(*sizes_m) if name in amplitudes else {}
-        reduced, more = _integrated(gram, own, free)
+        reduced, more = _integrated(normal, own, free)
         parts = reduced.eliminated()
         total = total + parts.matrix
         log_det += more + parts.log_det
@@ -111,15 +111,17 @@ def _deviance(
     return solve(total, every, precision, offset).deviance, log_det
 
 
-def _integrated(gram: TrialGram, own: Mapping[int, float], free: Sequence[int]) -> tuple[TrialGram, float]:
+def _integrated(
+    normal: NormalEquations, own: Mapping[int, float], free: Sequence[int]
+) -> tuple[NormalEquations, float]:
     """Return the equations over `free` with the columns `own` integrated out, and their log determinant."""
-    kept = [*free, gram.raw.shape[0] - 1]
-    raw, log_det = gram.raw[np.ix_(kept, kept)], 0.0
+    kept = [*free, normal.raw.shape[0] - 1]
+    raw, log_det = normal.raw[np.ix_(kept, kept)], 0.0
     if own:
         index, size = list(own), np.array(list(own.values()))
-        inner = gram.raw[np.ix_(index, index)] * size[:, None] * size + np.eye(len(index))
-        cross = gram.raw[np.ix_(index, kept)] * size[:, None]
+        inner = normal.raw[np.ix_(index, index)] * size[:, None] * size + np.eye(len(index))
+        cross = normal.raw[np.ix_(index, kept)] * size[:, None]
         raw = raw - cross.T @ np.linalg.solve(inner, cross)
         log_det = float(np.linalg.slogdet(inner)[1])
-    scattered = tuple(kept.index(k) for k in gram.scattered)
-    return TrialGram(raw, gram.count, scattered, gram.scatter_sd, gram.scatter_now), log_det
+    scattered = tuple(kept.index(k) for k in normal.scattered)
+    return NormalEquations(raw, normal.count, scattered, normal.scatter_sd, normal.scatter_now), log_det

@@ -14,10 +14,10 @@ import numpy as np
 
 from srs_opt.calibrate.alignment import FREE, align
 from srs_opt.calibrate.coordinates import SCATTER_SD, Coordinate
-from srs_opt.calibrate.gram import TrialGram, trial_gram
 from srs_opt.calibrate.model import Model
 from srs_opt.calibrate.noise import Noise, track_of
 from srs_opt.calibrate.nominal import ATTEMPTS, Meshes, Nodes, TrialRun
+from srs_opt.calibrate.normal_equations import NormalEquations, trial_normal_equations
 from srs_opt.calibrate.observe import Prediction, predict
 from srs_opt.calibrate.smooth import smooth_terms
 from srs_opt.calibrate.whiten import Whitening
@@ -32,7 +32,7 @@ Extra = Callable[[Trial, Prediction], np.ndarray]
 Slopes = tuple[tuple[str, ...], np.ndarray]  # coordinates, and a trial's slopes (n, K) in single precision
 Place = tuple[bool, dict[str, float]]  # where a trial was simulated: roughly or not, the values
 Memory = tuple[Meshes, Place | None, Slopes | None]
-Answer = TrialGram | np.ndarray | NoAnswerError
+Answer = NormalEquations | np.ndarray | NoAnswerError
 
 
 @dataclass(frozen=True)
@@ -213,7 +213,7 @@ class Trials:
                     self._motions[name] = wanted[name], nodes
         return {n: known[n] for n in names}
 
-    def _seen(self, name: str, nodes: Nodes, request: Request) -> TrialGram | np.ndarray:
+    def _seen(self, name: str, nodes: Nodes, request: Request) -> NormalEquations | np.ndarray:
         track = self._tracks[name]
         assert track is not None
         if request.coordinates is None:
@@ -240,8 +240,10 @@ class Trials:
         scattered = [names.index(n) for n in SCATTER_SD]
         now = point.scatter.get(name, np.zeros(len(SCATTER_SD)))
         whiten = self._whitening(name, noise)
-        gram = trial_gram(residual.ravel(), slopes, whiten, scattered, self._scatter_sd, now, own, own_sd)
-        return replace(gram, stale=stale)
+        normal = trial_normal_equations(
+            residual.ravel(), slopes, whiten, scattered, self._scatter_sd, now, own, own_sd
+        )
+        return replace(normal, stale=stale)
 
     def _own(
         self, name: str, prediction: Prediction, noise: Noise

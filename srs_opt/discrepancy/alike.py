@@ -38,7 +38,7 @@ class Angles:
         self._names = {c.name: k - lin.fitted for k, c in enumerate(lin.coordinates)}
         self._lower = [c.lower for c in lin.coordinates[lin.fitted :]]
         size, fitted = len(lin.coordinates), lin.fitted
-        total = sum_eliminated(lin.grams, lin.variance_inflation)[:size, :size]
+        total = sum_eliminated(lin.equations, lin.variance_inflation)[:size, :size]
         precision, _ = priors(lin.coordinates, lin.point)
         _, self._seen = projected(total, fitted, precision)
         self._whole = np.diag(total)[fitted:]

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from srs_opt.calibrate.experiment import Experiment, Point
-from srs_opt.calibrate.gram import TrialGram, bounded_solve
 from srs_opt.calibrate.instruments import check_expectations
+from srs_opt.calibrate.normal_equations import NormalEquations, bounded_solve
 from srs_opt.discrepancy.hypothesis import Hypothesis
 from srs_opt.discrepancy.select import Selection
 from srs_opt.errors import NoAnswerError
@@ -105,12 +105,12 @@ def next_experiment(
     return NextExperiment(what, names, round(power(gain), 3))
 
 
-def repeat_of(trial: str, grams: Mapping[str, TrialGram], other: str) -> NextExperiment:
+def repeat_of(trial: str, equations: Mapping[str, NormalEquations], other: str) -> NextExperiment:
     """Return that a trial be repeated: a wrong entry does not come twice.
 
     Its power is that of the misfit to come again.
     """
-    gain = grams[trial].misfit - grams[trial].count if trial in grams else 0.0
+    gain = equations[trial].misfit - equations[trial].count if trial in equations else 0.0
     what = f"repeat trial {trial}, and check its entry in the notebook"
     return NextExperiment(what, (f"a wrong entry of {trial}", other), round(power(gain), 3))
 
@@ -230,14 +230,14 @@ def _trial_gains(
         blank = Experiment(experiment.model, trials, experiment.noise)  # its markers stand at zero
         against = blank.residuals(trials, Point(truth.fit.point.values))
         seen = [_seen(t, -r) for t, r in zip(trials, against)]
-        grams = Experiment(experiment.model, seen, experiment.noise).grams(
+        equations = Experiment(experiment.model, seen, experiment.noise).normal_equations(
             Point(other.fit.point.values), other.fit.coordinates
         )
     except NoAnswerError:
         return dict.fromkeys(new, 0.0)
     found = {}
     for what, trial in new.items():
-        total = grams[trial.name].eliminated().matrix.copy()
+        total = equations[trial.name].eliminated().matrix.copy()
         total[:-1, :-1] += known
         found[what] = bounded_solve(total, free, none, none, none - np.inf).deviance
     return found

@@ -70,7 +70,7 @@ def explainable(examined: Examined) -> bool:
     As the linearisation has it, the noise taken for as large as the misfit makes it.
     """
     fit = examined.hypothesis.fit
-    left = excess_of(fit.grams) / fit.variance_inflation
+    left = excess_of(fit.equations) / fit.variance_inflation
     family = len(examined.scores)
     return any(
         s.relative_size >= TELLING and s.improvement > max(PROMISED * left, needed_gain(s.candidate, family))

@@ -10,9 +10,9 @@ import numpy as np
 from srs_opt.calibrate.candidates import all_candidates, fitted_coordinates
 from srs_opt.calibrate.experiment import Experiment, Point
 from srs_opt.calibrate.fit import start_point
-from srs_opt.calibrate.gram import RANK
 from srs_opt.calibrate.model import Model
 from srs_opt.calibrate.noise import Noise
+from srs_opt.calibrate.normal_equations import RANK
 from srs_opt.calibrate.objective import priors, projected, sum_eliminated
 from srs_opt.discrepancy.design import NOTHING, NextExperiment
 from srs_opt.discrepancy.examined import FALSE_NAME
@@ -42,12 +42,12 @@ def first_experiment(dataset: DataSet, noise: Noise, model: str | None = None) -
     point = start_point((*coordinates, *sizes))
     try:
         experiment = Experiment(Model(dataset.robot, model), trials, noise)
-        grams = experiment.grams(
+        equations = experiment.normal_equations(
             Point({**point.values, **{c.name: 0.0 for c in sizes}}), (*coordinates, *sizes)
         )
     except NoAnswerError:
         return None
-    total, fitted = sum_eliminated(grams), len(coordinates)
+    total, fitted = sum_eliminated(equations), len(coordinates)
     precision, _ = priors(coordinates, point)
     _, left = projected(total, fitted, precision, RANK)
     limit = chdtri(1, FALSE_NAME / len(candidates))

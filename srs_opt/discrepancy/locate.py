@@ -89,7 +89,7 @@ def stages(null: Hypothesis, fitted: Sequence[Hypothesis]) -> tuple[Place, ...]:
 
 def misfit_by_trial(examined: Examined) -> dict[str, float]:
     """Return every trial's misfit over its expectation under noise."""
-    return {n: g.misfit / max(g.count, 1) for n, g in examined.linearisation.grams.items()}
+    return {n: g.misfit / max(g.count, 1) for n, g in examined.linearisation.equations.items()}
 
 
 __all__ = ["Place", "locate", "misfit_by_trial", "stages", "sum_eliminated"]

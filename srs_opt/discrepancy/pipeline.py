@@ -236,7 +236,7 @@ def _examine(
         if following is None:
             misfit = misfit_by_trial(null)
             worst = max((t.name for t in split.open), key=lambda n: misfit[n])
-            following = repeat_of(worst, null.linearisation.grams, "something that the model lacks")
+            following = repeat_of(worst, null.linearisation.equations, "something that the model lacks")
     if verdict.word == DESCRIBED and description is not None and description.examined is not None:
         best = description.examined  # what the report shows, in a model that knows the term
         selection, experiment = Selection(best.hypothesis, (), {}), description.experiment or experiment

@@ -122,7 +122,7 @@ def how_much_is_left(examined: Examined) -> str:
     """Return in words how far a fit's misfit lies above the noise, and within what that is known."""
     fit = examined.hypothesis.fit
     left = fit.misfit_ratio - 1
-    within = math.sqrt(2 / sum(g.count for g in fit.grams.values()))  # standard deviation of a variance
+    within = math.sqrt(2 / sum(g.count for g in fit.equations.values()))  # standard deviation of a variance
     if left <= 0:
         return f"in size nothing beyond the noise, whose variance is known within {within:.1%}"
     return f"{left:.1%} (± {within:.1%}) of the noise's variance"

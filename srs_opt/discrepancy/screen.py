@@ -15,7 +15,7 @@ import numpy as np
 from srs_opt.calibrate.candidates import Candidate
 from srs_opt.calibrate.coordinates import Coordinate
 from srs_opt.calibrate.experiment import Point
-from srs_opt.calibrate.gram import TrialGram, bounded_solve
+from srs_opt.calibrate.normal_equations import NormalEquations, bounded_solve
 from srs_opt.calibrate.objective import priors, sum_eliminated
 
 
@@ -61,14 +61,14 @@ class Linearisation:
     fitted : int
         How many of them.
     point : Point
-    grams : dict
+    equations : dict
     variance_inflation : float
     """
 
     coordinates: tuple[Coordinate, ...]
     fitted: int
     point: Point
-    grams: Mapping[str, TrialGram]
+    equations: Mapping[str, NormalEquations]
     variance_inflation: float
 
     def column(self, name: str) -> int:
@@ -87,8 +87,8 @@ def screen(
         Effects of the fitted model that are taken out first (their sizes go to zero): a swap.
     """
     size = len(lin.coordinates)
-    index = [*range(size), next(iter(lin.grams.values())).raw.shape[0] - 1]
-    total = sum_eliminated(lin.grams, lin.variance_inflation)[np.ix_(index, index)]
+    index = [*range(size), next(iter(lin.equations.values())).raw.shape[0] - 1]
+    total = sum_eliminated(lin.equations, lin.variance_inflation)[np.ix_(index, index)]
     precision, offset = priors(lin.coordinates, lin.point)
     now = np.array([lin.point.values.get(c.name, 0.0) for c in lin.coordinates])
     lower = np.array([c.lower for c in lin.coordinates]) - now

@@ -174,8 +174,8 @@ class Search:
         fit = hypothesis.fit
         lin = self._linearise(fit)
         groups = self.functions.groups()
-        size, columns = len(lin.coordinates), next(iter(lin.grams.values())).raw.shape[0] - 1
-        total = sum_eliminated(lin.grams, 1.0)
+        size, columns = len(lin.coordinates), next(iter(lin.equations.values())).raw.shape[0] - 1
+        total = sum_eliminated(lin.equations, 1.0)
         precision, offset = priors(lin.coordinates[: lin.fitted], lin.point)
         score, covariance = project(total, range(lin.fitted), range(lin.fitted, columns), precision, offset)
         shared = self.functions.repeated_sd(self.experiment.noise)
@@ -185,7 +185,7 @@ class Search:
         tested = [g for g in further if min(g) >= 0]
         start = size - lin.fitted
         families = [[start + k for k in g.columns] for g in groups] + tested
-        serial = np.array([g.serial for g in lin.grams.values() if g.scattered])
+        serial = np.array([g.serial for g in lin.equations.values() if g.scattered])
         rng = np.random.default_rng([self.seed, 17])
         detection = detect(score, covariance, families, serial, rng)
         return Examined(hypothesis, lin, detection, groups, tuple(screen(lin, self.candidates)))
@@ -196,7 +196,7 @@ class Search:
         if examined.adequate or now.smooth or lin.variance_inflation > FAR_OFF:
             return examined
         amplitudes = self.functions.amplitudes(self.trials, len(lin.coordinates))
-        noise = smooth_part(now, lin.grams, amplitudes, lin.coordinates, lin.point)
+        noise = smooth_part(now, lin.equations, amplitudes, lin.coordinates, lin.point)
         return examined if noise == now else self.examine(self._under(noise, examined.hypothesis))
 
     def _with_rivals(self) -> list[Hypothesis]:
@@ -212,8 +212,10 @@ class Search:
         coordinates = (*fit.coordinates, *others)
         point = Point({**{c.name: 0.0 for c in others}, **fit.point.values}, fit.point.scatter)
         rough = fit.variance_inflation > PLAIN
-        grams = self.experiment.grams(point, coordinates, self.trials, self.functions, rough=rough)
-        return Linearisation(coordinates, len(fit.coordinates), point, grams, fit.variance_inflation)
+        equations = self.experiment.normal_equations(
+            point, coordinates, self.trials, self.functions, rough=rough
+        )
+        return Linearisation(coordinates, len(fit.coordinates), point, equations, fit.variance_inflation)
 
     def significant(self, score: Score) -> bool:
         """Whether a gain is too large for chance among all candidates."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from srs_opt.calibrate.fit import Fit
-from srs_opt.calibrate.gram import bounded_solve
+from srs_opt.calibrate.normal_equations import bounded_solve
 from srs_opt.calibrate.objective import priors
 from srs_opt.discrepancy.hypothesis import Hypothesis
 from srs_opt.discrepancy.search import RIVAL
@@ -88,7 +88,7 @@ def _predictive(hypotheses: Sequence[Hypothesis], split: Split) -> dict[str, tup
 def left_out_deviance(hypothesis: Hypothesis, folds: Sequence[Sequence[str]]) -> np.ndarray:
     """Return every trial's deviance under the fit without its fold (one linear step from the full fit)."""
     parts = {
-        name: g.eliminated(hypothesis.fit.variance_inflation) for name, g in hypothesis.fit.grams.items()
+        name: g.eliminated(hypothesis.fit.variance_inflation) for name, g in hypothesis.fit.equations.items()
     }
     found = []
     for fold in folds:
@@ -103,7 +103,8 @@ def _step_without(fit: Fit, fold: Sequence[str]) -> np.ndarray:
     now = np.array([fit.point.values[c.name] for c in fit.coordinates])
     lower = np.array([c.lower for c in fit.coordinates]) - now
     rest = np.sum(
-        [g.eliminated(fit.variance_inflation).matrix for n, g in fit.grams.items() if n not in fold], axis=0
+        [g.eliminated(fit.variance_inflation).matrix for n, g in fit.equations.items() if n not in fold],
+        axis=0,
     )
     return bounded_solve(rest, range(len(fit.coordinates)), precision, offset, lower).step
 

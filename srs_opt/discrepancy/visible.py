@@ -9,8 +9,8 @@ import numpy as np
 
 from srs_opt.calibrate.candidates import Candidate
 from srs_opt.calibrate.experiment import Experiment, Point
-from srs_opt.calibrate.gram import RANK
 from srs_opt.calibrate.noise import track_of
+from srs_opt.calibrate.normal_equations import RANK
 from srs_opt.calibrate.objective import priors, projected, sum_eliminated
 from srs_opt.discrepancy.examined import Examined, needed_gain
 from srs_opt.discrepancy.hypothesis import LARGE
@@ -67,7 +67,7 @@ def visible(
     them.
     """
     lin = null.linearisation
-    total = sum_eliminated(lin.grams, lin.variance_inflation)
+    total = sum_eliminated(lin.equations, lin.variance_inflation)
     precision, _ = priors(lin.coordinates, lin.point)
     inverse, left = projected(total, lin.fitted, precision, RANK)
     free = {c.name: k for k, c in enumerate(lin.coordinates[lin.fitted :])}
@@ -86,7 +86,7 @@ def visible(
         if seen:
             sizes[effect] = max(seen, key=lambda pair: pair[0] / pair[1].sizes[0].typical)
     point = null.hypothesis.fit.point
-    count = sum(g.count for g in lin.grams.values())
+    count = sum(g.count for g in lin.equations.values())
     needed = max(_needed(c, len(null.scores)) for c in candidates) if candidates else 0.0
     seen_m = max(
         needed * experiment.sd_m * float(np.sqrt(lin.variance_inflation / count)), settings.negligible_m

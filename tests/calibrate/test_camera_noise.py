@@ -11,8 +11,8 @@ from srs_opt.calibrate.colour import coloured
 from srs_opt.calibrate.coordinates import Coordinate
 from srs_opt.calibrate.entries import contradicted
 from srs_opt.calibrate.experiment import Point
-from srs_opt.calibrate.gram import TrialGram
 from srs_opt.calibrate.noise import Noise
+from srs_opt.calibrate.normal_equations import NormalEquations
 from srs_opt.calibrate.slow import Amplitudes, smooth_part
 from srs_opt.calibrate.usable import left_out
 from srs_opt.measurement.records import DataSet, Trial
@@ -111,15 +111,17 @@ def test_a_set_that_is_counted_from_the_head_is_not_left_out():
 )
 def test_smooth_errors_are_believed_when_small_and_never_hide_an_effect(amplitude, gap):
     rng = np.random.default_rng(11)
-    grams, none = {}, np.zeros(0)
+    equations, none = {}, np.zeros(0)
     for k in range(10):
         columns = rng.standard_normal((400, 7))  # one effect, four waves of the trial's own, two of drift
         own = amplitude / 1e-3 * rng.standard_normal(4)
         residual = gap * columns[:, 0] / 20 + columns[:, 1:5] @ own + rng.standard_normal(400)
         both = np.column_stack([columns, residual])
-        grams[str(k)] = TrialGram(both.T @ both, 400, (), none, none)
+        equations[str(k)] = NormalEquations(both.T @ both, 400, (), none, none)
     units = Amplitudes({5: 1e3, 6: 1e3}, dict.fromkeys(range(1, 5), 1e4))
     effect = (Coordinate("e.size", "e"),)
-    found = smooth_part(Noise(0.001), grams, dict.fromkeys(grams, units), effect, Point({"e.size": 0.0}))
+    found = smooth_part(
+        Noise(0.001), equations, dict.fromkeys(equations, units), effect, Point({"e.size": 0.0})
+    )
     assert found.drift_m == 0
     assert (found.systematic_m > 0) == (amplitude == 2e-3)  # ten times as much is a discovery

@@ -9,7 +9,7 @@ from scipy import optimize
 from srs_opt.calibrate.coordinates import Coordinate
 from srs_opt.calibrate.experiment import Point
 from srs_opt.calibrate.fit import CONVERGED, fit
-from srs_opt.calibrate.gram import trial_gram
+from srs_opt.calibrate.normal_equations import trial_normal_equations
 from srs_opt.calibrate.objective import AHEAD, MOST_SCATTER, bent_move, best_move, objective, within_reach
 from srs_opt.calibrate.whiten import Whitening
 
@@ -32,14 +32,14 @@ class Curved:
     def values(self, x):
         return x[0] * np.exp(x[1] * (1 + 0.2 * self.t))
 
-    def grams(self, point, coordinates, trials=None, *, stale=False, rough=False):
+    def normal_equations(self, point, coordinates, trials=None, *, stale=False, rough=False):
         x = np.array([point.values[c.name] for c in coordinates])
         if not stale:
             steps = 1e-6 * np.eye(2)
             ends = [(self.values(x + s) - self.values(x - s)) / 2e-6 for s in steps]
             self.slopes = np.column_stack(ends)
         none = np.zeros(0)
-        gram = trial_gram(
+        normal = trial_normal_equations(
             self.measured - self.values(x),
             self.slopes,
             Whitening.of_white(0.01, self.measured),
@@ -47,7 +47,7 @@ class Curved:
             none,
             none,
         )
-        return {"all": replace(gram, stale=stale)}
+        return {"all": replace(normal, stale=stale)}
 
 
 @pytest.mark.parametrize("count", [100, 100_000])
@@ -57,9 +57,9 @@ def test_a_converged_fit_has_nothing_left_to_gain_however_many_data(count, wrong
     found = fit(measured, COORDINATES, Point({"size.of_it": 0.8, "width.of_it": 0.5}), iterations=100)
     assert found.converged
     assert found.variance_inflation == 1
-    grams = measured.grams(found.point, COORDINATES)
-    now = objective(COORDINATES, grams, found.point, 1.0)
-    assert now - within_reach(COORDINATES, grams, found.point) < CONVERGED
+    equations = measured.normal_equations(found.point, COORDINATES)
+    now = objective(COORDINATES, equations, found.point, 1.0)
+    assert now - within_reach(COORDINATES, equations, found.point) < CONVERGED
     if not wrong:
         off = [found.point.values[c.name] - v for c, v in zip(COORDINATES, TRUTH)]
         assert np.all(np.abs(off) < 4 * np.array(list(found.sd.values())))
@@ -76,7 +76,9 @@ def test_a_step_with_scatter_at_its_limits_is_that_of_a_general_solver(seed):
         residual = slopes @ [0.5, -0.4] + (0.8, -0.9, 0.02)[k] * slopes[:, 0]  # more scatter than is allowed
         residual += 0.1 * rng.standard_normal(40)
         now = np.array([0.05 * (k - 1)])
-        trials[name] = trial_gram(residual, slopes, Whitening.of_white(0.1, residual), (0,), sd, now)
+        trials[name] = trial_normal_equations(
+            residual, slopes, Whitening.of_white(0.1, residual), (0,), sd, now
+        )
         own = np.zeros((40, 3))
         own[:, k] = slopes[:, 0]
         rows.append(np.column_stack([slopes, own]) / 0.1)
@@ -98,14 +100,14 @@ def test_a_step_with_scatter_at_its_limits_is_that_of_a_general_solver(seed):
 def test_the_bend_of_a_valley_is_followed_to_second_order(away, share):
     measured = Curved(1000)
     start = Point({"size.of_it": 0.4 * np.exp(1.1 * away), "width.of_it": 1.2 - away})
-    grams = measured.grams(start, COORDINATES)
-    move = best_move(COORDINATES, grams, start, 1.0, longest=np.inf)
+    equations = measured.normal_equations(start, COORDINATES)
+    move = best_move(COORDINATES, equations, start, 1.0, longest=np.inf)
 
     def there(step):
         values = {n: v + s for (n, v), s in zip(start.values.items(), step)}
-        return Point(values), measured.grams(Point(values), COORDINATES, stale=True)
+        return Point(values), measured.normal_equations(Point(values), COORDINATES, stale=True)
 
-    bent = bent_move(COORDINATES, grams, there(AHEAD * move.step)[1], start, 1.0, 0.0, move)
+    bent = bent_move(COORDINATES, equations, there(AHEAD * move.step)[1], start, 1.0, 0.0, move)
     lowest = fit(measured, COORDINATES, start, iterations=100).deviance
     left = [objective(COORDINATES, *there(m.step)[::-1], 1.0) - lowest for m in (move, bent)]
     assert left[1] < share * left[0]

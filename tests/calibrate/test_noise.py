@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import yaml
 
-from srs_opt.calibrate.gram import trial_gram
 from srs_opt.calibrate.noise import Noise, noise_of
+from srs_opt.calibrate.normal_equations import trial_normal_equations
 from srs_opt.calibrate.whiten import Whitening
 from srs_opt.errors import InputError
 from srs_opt.measurement.dataset import load_dataset, write_dataset
@@ -57,13 +57,13 @@ def test_what_is_a_trials_own_is_integrated_out():
     seen, rng = np.isfinite(values), np.random.default_rng(2)
     slopes, own, own_sd = rng.random((values.size, 3)), rng.random((values.size, 2)), np.array([0.5, 2.0])
     whiten, none = Whitening(noise, TIME_S, seen), np.zeros(0)
-    gram = trial_gram(values.ravel(), slopes, whiten, (), none, none, own, own_sd)
+    normal = trial_normal_equations(values.ravel(), slopes, whiten, (), none, none, own, own_sd)
     rows = seen.ravel()
     part = own[rows] * own_sd
     weight = np.linalg.inv(covariance_of(noise, seen) + part @ part.T)
     both = np.column_stack([slopes, values.ravel()])[rows]
-    assert gram.raw == pytest.approx(both.T @ weight @ both, rel=1e-8)
-    assert gram.count == rows.sum()
+    assert normal.raw == pytest.approx(both.T @ weight @ both, rel=1e-8)
+    assert normal.count == rows.sum()
 
 
 def test_white_noise_is_found_below_a_motion():

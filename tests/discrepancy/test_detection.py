@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from srs_opt.calibrate.gram import trial_gram
+from srs_opt.calibrate.normal_equations import trial_normal_equations
 from srs_opt.calibrate.whiten import Whitening
 from srs_opt.discrepancy.detect import detect, project
 
@@ -23,8 +23,8 @@ def one(seed, gap=0.0):
         own[5] += gap
         residual = slopes @ own + sd * rng.standard_normal(60)
         whiten = Whitening.of_white(sd, residual)
-        gram = trial_gram(residual, slopes, whiten, (0,), scatter_sd, np.zeros(1))
-        total = total + gram.eliminated().matrix
+        normal = trial_normal_equations(residual, slopes, whiten, (0,), scatter_sd, np.zeros(1))
+        total = total + normal.eliminated().matrix
     score, covariance = project(total, range(3), range(3, 9), np.full(3, 25.0), np.zeros(3))
     return detect(score, covariance, GROUPS, np.zeros(10), np.random.default_rng(seed)).p_value
 

@@ -53,8 +53,8 @@ def imported(tmp_path, time, points, columns=("1.5", "48", "0.2", "1.5707963")):
 def misfit(trial):
     base = fitted_coordinates(ROBOT)
     experiment = Experiment(Model(ROBOT, "complex"), [trial], SD)
-    gram = experiment.grams(start_point(base), base)["a"]
-    return gram.misfit / gram.count, gram
+    normal = experiment.normal_equations(start_point(base), base)["a"]
+    return normal.misfit / normal.count, normal
 
 
 def test_a_take_that_begins_in_mid_gait_is_explained_to_the_noise(tmp_path, lab):
@@ -65,11 +65,11 @@ def test_a_take_that_begins_in_mid_gait_is_explained_to_the_noise(tmp_path, lab)
     assert trial.moving
     assert trial.frequency_hz == pytest.approx(1.514, abs=0.002)  # 0.7 % off when listed
     assert any("taken as seen" in w for w in notes[0].warnings)
-    ratio, gram = misfit(trial)
+    ratio, normal = misfit(trial)
     # 4.7 s of 1 mm markers: 1 +- 0.02 for the true robot
     assert 0.94 < ratio < 1.06
     # pose and clock are no part of what the coordinates are blamed for
-    assert np.isfinite(gram.raw).all()
+    assert np.isfinite(normal.raw).all()
 
 
 def test_the_data_set_keeps_what_begins_in_motion(tmp_path, lab):

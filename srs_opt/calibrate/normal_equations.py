@@ -18,7 +18,7 @@ RANK = 1e-12  # of the largest eigenvalue of scaled normal equations; below it a
 
 
 @dataclass(frozen=True)
-class TrialGram:
+class NormalEquations:
     """One trial's normal equations, scatter not yet eliminated.
 
     Attributes
@@ -115,12 +115,14 @@ class TrialGram:
         back = (self.scatter_now + moved) / self.scatter_sd**2
         return np.asarray(-(self.raw[list(self.scattered)] @ both) / inflation - back)
 
-    def bent(self, ahead: TrialGram, step: np.ndarray, moved: np.ndarray, share: float) -> TrialGram:
+    def bent(
+        self, ahead: NormalEquations, step: np.ndarray, moved: np.ndarray, share: float
+    ) -> NormalEquations:
         """Return equations whose solution undoes the bend of the prediction along a step and a move.
 
         Parameters
         ----------
-        ahead : TrialGram
+        ahead : NormalEquations
             With the slopes of this point, the residuals of where `share` of the step leads.
         """
         both = step.copy()
@@ -130,12 +132,12 @@ class TrialGram:
         raw[:-1, -1] = raw[-1, :-1] = 2 / share**2 * (ahead.raw[:-1, -1] - straight)
         return replace(self, raw=raw, scatter_now=np.zeros_like(self.scatter_now))
 
-    def only(self, columns: Sequence[int]) -> TrialGram:
+    def only(self, columns: Sequence[int]) -> NormalEquations:
         """Return the Gram matrix over some of the columns (all of the scatter's among them)."""
         keep = [*columns, self.raw.shape[0] - 1]
         scattered = tuple(keep.index(k) for k in self.scattered)
         raw = self.raw[np.ix_(keep, keep)]
-        return TrialGram(raw, self.count, scattered, self.scatter_sd, self.scatter_now, self.serial)
+        return NormalEquations(raw, self.count, scattered, self.scatter_sd, self.scatter_now, self.serial)
 
 
 @dataclass(frozen=True)
@@ -160,7 +162,7 @@ class Eliminated:
     back: np.ndarray
 
 
-def trial_gram(
+def trial_normal_equations(
     residual: np.ndarray,
     slopes: np.ndarray,
     whiten: Whitening,
@@ -169,7 +171,7 @@ def trial_gram(
     scatter_now: np.ndarray,
     own: np.ndarray | None = None,
     own_sd: np.ndarray | None = None,
-) -> TrialGram:
+) -> NormalEquations:
     """Return one trial's Gram matrix for residuals (n,) and slopes (n, K), (T C) in a row.
 
     Parameters
@@ -194,7 +196,7 @@ def trial_gram(
         raw = (raw + raw.T) / 2
     count = both.shape[0] - (0 if own_sd is None else int(np.sum(np.isinf(own_sd))))
     serial = serial_correlation(whiten.in_place(left))
-    return TrialGram(raw, count, tuple(scattered), scatter_sd, scatter_now, serial)
+    return NormalEquations(raw, count, tuple(scattered), scatter_sd, scatter_now, serial)
 
 
 @dataclass(frozen=True)
