@@ -12,8 +12,8 @@ from srs_opt.calibrate.coordinates import Coordinate
 from srs_opt.calibrate.instruments import NAME, reading_equations, readings
 from srs_opt.calibrate.model import Model
 from srs_opt.calibrate.noise import Noise, track_of
-from srs_opt.calibrate.nominal import tolerance_for
 from srs_opt.calibrate.normal_equations import NormalEquations
+from srs_opt.calibrate.trial_simulation import tolerance_for
 from srs_opt.calibrate.trials import Extra, Point, Request, Trials
 from srs_opt.errors import NoAnswerError
 from srs_opt.measurement.records import Bench, Trial

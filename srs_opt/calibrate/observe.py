@@ -12,8 +12,8 @@ import numpy as np
 from srs_opt.calibrate.coordinates import Coordinate
 from srs_opt.calibrate.mapped import evaluate, mapped
 from srs_opt.calibrate.model import Model, Values
-from srs_opt.calibrate.nominal import Nodes, conditions_of
 from srs_opt.calibrate.sensitivity import Variation, onset, variation
+from srs_opt.calibrate.trial_simulation import Nodes, conditions_of
 from srs_opt.measurement.records import Trial
 from srs_opt.measurement.spots import Spots
 from srs_opt.model.effects import known_effects

@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from srs_opt.calibrate.nominal import Nodes
 from srs_opt.calibrate.start import start_pose
+from srs_opt.calibrate.trial_simulation import Nodes
 from srs_opt.model.parameters import Structure
 from srs_opt.model.registry import state_layout
 from srs_opt.model.state import StateLayout

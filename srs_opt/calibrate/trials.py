@@ -16,10 +16,10 @@ from srs_opt.calibrate.alignment import FREE, align
 from srs_opt.calibrate.coordinates import SCATTER_SD, Coordinate
 from srs_opt.calibrate.model import Model
 from srs_opt.calibrate.noise import Noise, track_of
-from srs_opt.calibrate.nominal import ATTEMPTS, Meshes, Nodes, TrialRun
 from srs_opt.calibrate.normal_equations import NormalEquations, trial_normal_equations
 from srs_opt.calibrate.observe import Prediction, predict
 from srs_opt.calibrate.smooth import smooth_terms
+from srs_opt.calibrate.trial_simulation import ATTEMPTS, Meshes, Nodes, TrialRun
 from srs_opt.calibrate.whiten import Whitening
 from srs_opt.errors import NoAnswerError
 from srs_opt.measurement.records import Trial

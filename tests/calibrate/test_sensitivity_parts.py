@@ -8,9 +8,9 @@ from srs_opt.calibrate.coordinates import base_coordinates
 from srs_opt.calibrate.experiment import Experiment, Point
 from srs_opt.calibrate.fit import start_point
 from srs_opt.calibrate.model import Model
-from srs_opt.calibrate.nominal import FINEST_M_S, TOLERANCE_M_S, conditions_of, tolerance_for
 from srs_opt.calibrate.sensitivity import HAIR, variation
 from srs_opt.calibrate.start import start_pose
+from srs_opt.calibrate.trial_simulation import FINEST_M_S, TOLERANCE_M_S, conditions_of, tolerance_for
 from srs_opt.measurement.records import Trial
 from srs_opt.orbit.sensitivity import tangent_kernel
 from srs_opt.robot import wpi_srs

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from srs_opt.calibrate.nominal import timeline_of
+from srs_opt.calibrate.trial_simulation import timeline_of
 from srs_opt.errors import InputError
 from srs_opt.measurement.dataset import load_dataset
 from srs_opt.measurement.dataset import write_dataset as save
