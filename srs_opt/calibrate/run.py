@@ -43,7 +43,7 @@ def calibrate(
     NoAnswerError
         If the robot cannot be simulated under the trials' conditions.
     """
-    from srs_opt.calibrate.usable import left_out
+    from srs_opt.calibrate.rejection import left_out
 
     tell = report or (lambda message: None)
     dataset = _mended(dataset, tell)

@@ -13,7 +13,7 @@ from zlib import crc32
 
 import numpy as np
 
-from srs_opt.calibrate.usable import left_out
+from srs_opt.calibrate.rejection import left_out
 from srs_opt.measurement.records import Trial
 
 SEALED_SHARE = 0.25

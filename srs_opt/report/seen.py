@@ -13,7 +13,7 @@ from srs_opt.calibrate.candidates import fitted_coordinates
 from srs_opt.calibrate.experiment import Experiment, Point
 from srs_opt.calibrate.model import Model
 from srs_opt.calibrate.noise import noise_of
-from srs_opt.calibrate.usable import usable
+from srs_opt.calibrate.rejection import rejection_reason
 from srs_opt.errors import InputError, NoAnswerError
 from srs_opt.measurement.motion import Motion, trial_motion
 from srs_opt.measurement.records import DataSet, Trial
@@ -79,7 +79,7 @@ def look(
             f"robot '{robot.name}' has {robot.links} links, that of data set '{dataset.name}' has "
             f"{dataset.robot.links}"
         )
-    simulated = [t for t in dataset.trials if not usable(t)]
+    simulated = [t for t in dataset.trials if not rejection_reason(t)]
     experiment = Experiment(Model(robot), simulated, noise_of(dataset))
     start = Point({c.name: 0.0 for c in fitted_coordinates(robot) if not c.effect})
     found = []
@@ -109,7 +109,7 @@ def _seen(
         else:
             if not motion.settled:
                 warnings.append("the gait still changes from cycle to cycle in the trial's second half")
-    reason = usable(trial)
+    reason = rejection_reason(trial)
     if reason:
         warnings.append(f"not simulated: {reason}")
     else:

@@ -15,7 +15,7 @@ _LEAST_FRAMES, _LEAST_SEEN = 20, 0.3
 MOST_WRONG = 0.34  # share of the trials that may be entered wrongly
 
 
-def usable(trial: Trial) -> str:
+def rejection_reason(trial: Trial) -> str:
     """Return why a trial cannot be used; empty when it can."""
     track = track_of(trial)
     if trial.kind in _PASSIVE:
@@ -35,7 +35,7 @@ def left_out(trials: Sequence[Trial]) -> dict[str, str]:
 
     Where most tracks contradict their entries, it is not the entries: markers are counted from the head, say.
     """
-    found = {t.name: why for t in trials if (why := usable(t))}
+    found = {t.name: why for t in trials if (why := rejection_reason(t))}
     rest = [t for t in trials if t.name not in found]
     wrong = {t.name: why for t in rest if (why := contradicted(t))}
     return found | wrong if len(wrong) <= MOST_WRONG * len(rest) else found
