@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from srs_opt.calibrate.start import start_pose
+from srs_opt.calibrate.initial_pose import initial_pose
 from srs_opt.calibrate.trial_simulation import Nodes
 from srs_opt.model.parameters import Structure
 from srs_opt.model.registry import state_layout
@@ -64,7 +64,7 @@ def variation(
         return Course(x, h, nodes.valve, q)
 
     courses = []
-    for off, seed, turn in zip(hair, seeds.T, (start_pose(structure, p, heading_rad)[1] @ seeds).T):
+    for off, seed, turn in zip(hair, seeds.T, (initial_pose(structure, p, heading_rad)[1] @ seeds).T):
         x = start.copy()
         x[:3] += off * turn
         courses.append(course(x, p + off * seed))

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from srs_opt.calibrate.initial_pose import initial_pose
 from srs_opt.calibrate.model import Conditions, Model, Packed, Values
-from srs_opt.calibrate.start import start_pose
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait, Wave
 from srs_opt.measurement.records import Applied, Schedule, Trial
@@ -185,7 +185,7 @@ class TrialRun:
 
     def _start(self, structure: Structure, p: np.ndarray) -> np.ndarray:
         x = np.zeros(state_layout(structure).size)
-        x[:3] = start_pose(self.model.full, p, self.trial.heading_rad)[0]
+        x[:3] = initial_pose(self.model.full, p, self.trial.heading_rad)[0]
         return x
 
     def _piece(

@@ -7,9 +7,9 @@ from srs_opt.calibrate.candidates import all_candidates
 from srs_opt.calibrate.coordinates import base_coordinates
 from srs_opt.calibrate.experiment import Experiment, Point
 from srs_opt.calibrate.fit import start_point
+from srs_opt.calibrate.initial_pose import initial_pose
 from srs_opt.calibrate.model import Model
 from srs_opt.calibrate.sensitivity import HAIR, variation
-from srs_opt.calibrate.start import start_pose
 from srs_opt.calibrate.trial_simulation import FINEST_M_S, TOLERANCE_M_S, conditions_of, tolerance_for
 from srs_opt.measurement.records import Trial
 from srs_opt.orbit.sensitivity import tangent_kernel
@@ -67,7 +67,7 @@ def test_differences_are_the_tangents_of_the_integration(setting, effects):
     for k in range(len(coordinates)):
         p = np.concatenate([nodes.p[kept], seeds[:, k]])
         moved = np.zeros(state.size)
-        moved[:3] = start_pose(structure, nodes.p[kept], trial.heading_rad)[1] @ seeds[:, k]
+        moved[:3] = initial_pose(structure, nodes.p[kept], trial.heading_rad)[1] @ seeds[:, k]
         tangent = kernel.run([Course(np.concatenate([state, moved]), h, inputs, p)])[0][:, state.size :, 0]
         rounding = 1e-14 / (HAIR * typical[k])  # of states of the order of one
         for mine, theirs in (

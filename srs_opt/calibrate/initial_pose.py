@@ -12,7 +12,7 @@ from srs_opt.model.registry import build
 
 
 @lru_cache(maxsize=8)
-def _start_function(structure: Structure) -> ca.Function:
+def _initial_pose_function(structure: Structure) -> ca.Function:
     parameters, m, _ = build(structure)
     heading = ca.SX.sym("heading")
     x, y = (ca.substitute(v[0], m.shape, ca.SX.zeros(m.shape.shape)) for v in (m.chain.x, m.chain.y))
@@ -22,7 +22,7 @@ def _start_function(structure: Structure) -> ca.Function:
     return ca.Function("start", [p, heading], [pose, ca.jacobian(pose, p)])
 
 
-def start_pose(structure: Structure, p: np.ndarray, heading_rad: float) -> tuple[np.ndarray, np.ndarray]:
+def initial_pose(structure: Structure, p: np.ndarray, heading_rad: float) -> tuple[np.ndarray, np.ndarray]:
     """Return the pose (3,) of the straight robot with its tail at the origin, and its derivative by p."""
-    pose, slope = _start_function(structure)(p, heading_rad)
+    pose, slope = _initial_pose_function(structure)(p, heading_rad)
     return np.asarray(pose).ravel(), np.asarray(slope)
