@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from srs_opt.calibrate.candidates import effect_spec, entry_sd, with_sd
 from srs_opt.calibrate.result import bench_warnings, calibrated_robot
-from srs_opt.discrepancy.examined import needed_gain
+from srs_opt.discrepancy.diagnostics import needed_gain
 from srs_opt.discrepancy.hypothesis import Hypothesis
 from srs_opt.discrepancy.locate import left_places
 from srs_opt.discrepancy.screen import Score
@@ -105,10 +105,10 @@ def _remainder(found: Discrepancy) -> dict[str, Any] | None:
 
 def remainder_place(found: Discrepancy) -> str | None:
     """Return where what is left shows most, in words; None where nothing significant is left."""
-    examined = found.null if found.verdict.word == NO_GAP else found.best
-    if examined is None or examined.adequate:
+    diagnostics = found.null if found.verdict.word == NO_GAP else found.best
+    if diagnostics is None or diagnostics.adequate:
         return None
-    places = left_places(examined)
+    places = left_places(diagnostics)
     return f"mostly in {places[0].where}, varying with {places[0].against}" if places else None
 
 

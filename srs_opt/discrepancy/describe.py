@@ -17,7 +17,7 @@ from srs_opt.calibrate.candidates import Candidate, effect_spec, entry_sd
 from srs_opt.calibrate.experiment import Experiment
 from srs_opt.calibrate.fit import Fit, start_point
 from srs_opt.calibrate.forms import form_of_entry, forms_of
-from srs_opt.discrepancy.examined import Examined, needed_gain
+from srs_opt.discrepancy.diagnostics import Diagnostics, needed_gain
 from srs_opt.discrepancy.hypothesis import Hypothesis
 from srs_opt.discrepancy.screen import Linearisation, Score, expected_start, screen
 from srs_opt.discrepancy.seal import Gap, open_seal
@@ -74,7 +74,7 @@ class Description:
         All terms that were fitted, to the start of a few trials, best first.
     why_not : str
         Why it is not believed; empty when it is.
-    examined : Examined or None
+    diagnostics : Diagnostics or None
         The best with its tests, where it is believed.
     experiment : Experiment or None
         In which it can be simulated.
@@ -84,7 +84,7 @@ class Description:
     gap: Gap | None
     tried: tuple[Hypothesis, ...]
     why_not: str
-    examined: Examined | None = None
+    diagnostics: Diagnostics | None = None
     experiment: Experiment | None = None
 
     @property
@@ -119,7 +119,7 @@ def describe_gap(
     found = describe(own, null.fit, listed.fit, sealed)
     if found is None or found.why_not:
         return found
-    return replace(found, examined=own.examine(found.best), experiment=experiment)
+    return replace(found, diagnostics=own.examine(found.best), experiment=experiment)
 
 
 def terms_of(links: int, present: Sequence[str] = ()) -> tuple[Candidate, ...]:
@@ -172,8 +172,8 @@ def _fitted(search: Search, null: Fit, settings: Settings) -> list[Hypothesis]:
 
     bench = replace(first, fit=replace(first.fit, point=start_point(search.base)))
     screens = []
-    for examined in (brief.examine(first), brief.examine(bench)):
-        screens.append([(examined.linearisation, score) for score in examined.scores])
+    for diagnostics in (brief.examine(first), brief.examine(bench)):
+        screens.append([(diagnostics.linearisation, score) for score in diagnostics.scores])
     for lin, score in itertools.chain.from_iterable(zip(*screens)):
         if len(found) < settings.refits:
             attempt(lin, score)

@@ -15,7 +15,7 @@ from srs_opt.calibrate.noise import Noise
 from srs_opt.calibrate.normal_equations import RANK
 from srs_opt.calibrate.objective import priors, projected, sum_eliminated
 from srs_opt.discrepancy.design import NOTHING, NextExperiment
-from srs_opt.discrepancy.examined import FALSE_NAME
+from srs_opt.discrepancy.diagnostics import FALSE_NAME
 from srs_opt.errors import NoAnswerError
 from srs_opt.measurement.records import DataSet, Trial
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from srs_opt.calibrate.objective import sum_eliminated
-from srs_opt.discrepancy.examined import Examined
+from srs_opt.discrepancy.diagnostics import Diagnostics
 from srs_opt.discrepancy.hypothesis import Hypothesis
 
 CLOSES = 0.5  # share of the misfit that a fit must close to say where the gap is
@@ -40,25 +40,25 @@ class Place:
     p_value: float
 
 
-def locate(examined: Examined, fitted: Sequence[Hypothesis] = (), most: int = 8) -> tuple[Place, ...]:
+def locate(diagnostics: Diagnostics, fitted: Sequence[Hypothesis] = (), most: int = 8) -> tuple[Place, ...]:
     """Return where the gap is, then where it shows most, best first.
 
     Parameters
     ----------
-    examined : Examined
+    diagnostics : Diagnostics
         Calibration alone.
     fitted : sequence of Hypothesis
         What was fitted to close the gap: effects, or terms that describe it.
     """
-    return (*stages(examined.hypothesis, fitted), *left_places(examined)[:most])
+    return (*stages(diagnostics.hypothesis, fitted), *left_places(diagnostics)[:most])
 
 
-def left_places(examined: Examined) -> list[Place]:
+def left_places(diagnostics: Diagnostics) -> list[Place]:
     """Return the parts of the motion in which a model leaves something significant, the largest first."""
-    detection = examined.detection
+    detection = diagnostics.detection
     places = [
         Place(g.where, g.against, s.improvement / max(s.dof, 1), a)
-        for g, s, a in zip(examined.groups, detection.groups, detection.adjusted)
+        for g, s, a in zip(diagnostics.groups, detection.groups, detection.adjusted)
         if a < 0.05
     ]
     return sorted(places, key=lambda p: -p.score)
@@ -87,9 +87,9 @@ def stages(null: Hypothesis, fitted: Sequence[Hypothesis]) -> tuple[Place, ...]:
     return tuple(found.values())
 
 
-def misfit_by_trial(examined: Examined) -> dict[str, float]:
+def misfit_by_trial(diagnostics: Diagnostics) -> dict[str, float]:
     """Return every trial's misfit over its expectation under noise."""
-    return {n: g.misfit / max(g.count, 1) for n, g in examined.linearisation.equations.items()}
+    return {n: g.misfit / max(g.count, 1) for n, g in diagnostics.linearisation.equations.items()}
 
 
 __all__ = ["Place", "locate", "misfit_by_trial", "stages", "sum_eliminated"]

@@ -18,7 +18,7 @@ from srs_opt.calibrate.noise import Noise, noise_of
 from srs_opt.discrepancy.alike import Pair, alike_pairs
 from srs_opt.discrepancy.describe import Description, describe_gap
 from srs_opt.discrepancy.design import NextExperiment, next_experiment, repeat_of, rivals_of
-from srs_opt.discrepancy.examined import Examined
+from srs_opt.discrepancy.diagnostics import Diagnostics
 from srs_opt.discrepancy.first import first_experiment
 from srs_opt.discrepancy.hypothesis import Hypothesis
 from srs_opt.discrepancy.locate import Place, locate, misfit_by_trial
@@ -49,7 +49,7 @@ class Discrepancy(Result):
     dataset : DataSet
     verdict : Verdict
     split : Split
-    null, best : Examined or None
+    null, best : Diagnostics or None
         Calibration alone; the best set of effects.
     selection : Selection or None
     located : tuple of Place
@@ -73,8 +73,8 @@ class Discrepancy(Result):
     dataset: DataSet
     verdict: Verdict
     split: Split
-    null: Examined | None
-    best: Examined | None
+    null: Diagnostics | None
+    best: Diagnostics | None
     selection: Selection | None
     located: tuple[Place, ...]
     scores: tuple[Score, ...]
@@ -237,8 +237,8 @@ def _examine(
             misfit = misfit_by_trial(null)
             worst = max((t.name for t in split.open), key=lambda n: misfit[n])
             following = repeat_of(worst, null.linearisation.equations, "something that the model lacks")
-    if verdict.word == DESCRIBED and description is not None and description.examined is not None:
-        best = description.examined  # what the report shows, in a model that knows the term
+    if verdict.word == DESCRIBED and description is not None and description.diagnostics is not None:
+        best = description.diagnostics  # what the report shows, in a model that knows the term
         selection, experiment = Selection(best.hypothesis, (), {}), description.experiment or experiment
     return Discrepancy(
         dataset,
@@ -263,7 +263,7 @@ def _examine(
     )
 
 
-def without_odd(search: Search, null: Examined) -> tuple[Search, Examined, dict[str, str]]:
+def without_odd(search: Search, null: Diagnostics) -> tuple[Search, Diagnostics, dict[str, str]]:
     """Return the search and calibration alone without the trials that contradict all others, and these."""
     tried: dict[tuple[str, ...], tuple[Search, Hypothesis]] = {}
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from srs_opt.calibrate.result import bench_warnings
-from srs_opt.discrepancy.examined import Examined
+from srs_opt.discrepancy.diagnostics import Diagnostics
 from srs_opt.discrepancy.pictures import gap_picture, pictures
 from srs_opt.discrepancy.pipeline import Discrepancy
 from srs_opt.discrepancy.verdict import (
@@ -106,21 +106,21 @@ def _parameters(found: Discrepancy) -> list[dict[str, Any]]:
 
 def _tests(found: Discrepancy) -> list[dict[str, Any]]:
     rows = []
-    for what, examined in (("calibration alone", found.null), ("best set of effects", found.best)):
-        if examined is not None:
+    for what, diagnostics in (("calibration alone", found.null), ("best set of effects", found.best)):
+        if diagnostics is not None:
             rows.append(
                 {
-                    "what": f"{what}: {examined.hypothesis.label}",
-                    "p": examined.detection.p_value,
-                    "misfit": examined.hypothesis.fit.misfit_ratio,
+                    "what": f"{what}: {diagnostics.hypothesis.label}",
+                    "p": diagnostics.detection.p_value,
+                    "misfit": diagnostics.hypothesis.fit.misfit_ratio,
                 }
             )
     return rows
 
 
-def how_much_is_left(examined: Examined) -> str:
+def how_much_is_left(diagnostics: Diagnostics) -> str:
     """Return in words how far a fit's misfit lies above the noise, and within what that is known."""
-    fit = examined.hypothesis.fit
+    fit = diagnostics.hypothesis.fit
     left = fit.misfit_ratio - 1
     within = math.sqrt(2 / sum(g.count for g in fit.equations.values()))  # standard deviation of a variance
     if left <= 0:

@@ -17,7 +17,7 @@ from srs_opt.calibrate.objective import priors, sum_eliminated
 from srs_opt.calibrate.slow import smooth_part
 from srs_opt.discrepancy.alike import Angles
 from srs_opt.discrepancy.detect import detect, project, with_shared
-from srs_opt.discrepancy.examined import TELLING, Examined, explainable, explained, needed_gain
+from srs_opt.discrepancy.diagnostics import TELLING, Diagnostics, explainable, explained, needed_gain
 from srs_opt.discrepancy.functions import ResidualFunctions
 from srs_opt.discrepancy.hypothesis import ITERATIONS, SMALL, Hypothesis, cost, fit_hypothesis, left_of, stuck
 from srs_opt.discrepancy.screen import Linearisation, Score, expected_start, screen
@@ -169,7 +169,7 @@ class Search:
         """Return a hypothesis under the noise assumed by now."""
         return self.fit(hypothesis.candidates, hypothesis.fit.point) or hypothesis
 
-    def examine(self, hypothesis: Hypothesis) -> Examined:
+    def examine(self, hypothesis: Hypothesis) -> Diagnostics:
         """Linearise about a fitted hypothesis, test what is left and screen what could explain it."""
         fit = hypothesis.fit
         lin = self._linearise(fit)
@@ -188,16 +188,16 @@ class Search:
         serial = np.array([g.serial for g in lin.equations.values() if g.scattered])
         rng = np.random.default_rng([self.seed, 17])
         detection = detect(score, covariance, families, serial, rng)
-        return Examined(hypothesis, lin, detection, groups, tuple(screen(lin, self.candidates)))
+        return Diagnostics(hypothesis, lin, detection, groups, tuple(screen(lin, self.candidates)))
 
-    def noise_aware(self, examined: Examined) -> Examined:
+    def noise_aware(self, diagnostics: Diagnostics) -> Diagnostics:
         """Return a hypothesis examined anew under smooth errors, if small ones explain what it leaves."""
-        now, lin = self.experiment.noise, examined.linearisation
-        if examined.adequate or now.smooth or lin.variance_inflation > FAR_OFF:
-            return examined
+        now, lin = self.experiment.noise, diagnostics.linearisation
+        if diagnostics.adequate or now.smooth or lin.variance_inflation > FAR_OFF:
+            return diagnostics
         amplitudes = self.functions.amplitudes(self.trials, len(lin.coordinates))
         noise = smooth_part(now, lin.equations, amplitudes, lin.coordinates, lin.point)
-        return examined if noise == now else self.examine(self._under(noise, examined.hypothesis))
+        return diagnostics if noise == now else self.examine(self._under(noise, diagnostics.hypothesis))
 
     def _with_rivals(self) -> list[Hypothesis]:
         """Return what was fitted, and the best that were fitted under another noise fitted anew."""
@@ -221,7 +221,7 @@ class Search:
         """Whether a gain is too large for chance among all candidates."""
         return score.improvement > needed_gain(score.candidate, len(self.candidates))
 
-    def run(self, null: Examined) -> tuple[Examined, list[Hypothesis]]:
+    def run(self, null: Diagnostics) -> tuple[Diagnostics, list[Hypothesis]]:
         """Return the best set of effects, examined, and everything that was refitted."""
         current, ended = self._begun(null)
         for _ in range(0 if ended else ROUNDS):
@@ -240,7 +240,7 @@ class Search:
                 break
         return current, self._with_rivals()
 
-    def _begun(self, null: Examined) -> tuple[Examined, bool]:
+    def _begun(self, null: Diagnostics) -> tuple[Diagnostics, bool]:
         """Return what a search of the start of a few trials finds, fitted to all; whether that is the end.
 
         It takes a third of the time, and most of a gap that it is left with is not mended by more data.
@@ -280,7 +280,7 @@ class Search:
             return hypothesis
         return self.fit(hypothesis.candidates, fit.point, POLISH) or hypothesis
 
-    def _settled(self, null: Examined, current: Examined) -> bool:
+    def _settled(self, null: Diagnostics, current: Diagnostics) -> bool:
         """Whether there is nothing left to look for.
 
         What friction's smoothing may have left does not count, unless the fit had to go far from physics or
@@ -288,7 +288,7 @@ class Search:
         """
         return current.adequate or (explained(null, current) and not current.hypothesis.implausible())
 
-    def _swapped(self, current: Examined, added: Hypothesis | None) -> Hypothesis | None:
+    def _swapped(self, current: Diagnostics, added: Hypothesis | None) -> Hypothesis | None:
         """Return the better of `added` and the best exchange of one effect for another."""
         lin, have = current.linearisation, current.hypothesis.candidates
         best = added
@@ -316,7 +316,7 @@ class Search:
         tried = self._fits.get(key) or self.try_out(hypothesis.candidates, hypothesis.fit.point)
         return math.inf if tried is None else cost(tried)
 
-    def _proposals(self, current: Examined, depth: int) -> list[Score]:
+    def _proposals(self, current: Diagnostics, depth: int) -> list[Score]:
         """Return the candidates that deserve a refit, best first."""
         inflation = current.hypothesis.fit.variance_inflation
         scores = [s for s in current.scores if self.significant(s) or s.improvement * inflation > 60]
@@ -339,7 +339,7 @@ class Search:
                         chosen.append(s)
         return [*leaps, *chosen]
 
-    def _refit(self, current: Examined, proposals: list[Score], most: int) -> Hypothesis | None:
+    def _refit(self, current: Diagnostics, proposals: list[Score], most: int) -> Hypothesis | None:
         """Refit proposals on the start of a few trials, best first; return the best fit to all of them."""
         found: list[Hypothesis] = []
         have = current.hypothesis.candidates
@@ -358,7 +358,7 @@ class Search:
         near = [h for h in found if cost(h) < cost(found[0]) + 2 * RIVAL]
         return self._best_of_whole(near)
 
-    def _start(self, current: Examined, score: Score) -> Point:
+    def _start(self, current: Diagnostics, score: Score) -> Point:
         """Return where to begin a refit with a candidate added.
 
         A body that begins to bend under load moves otherwise before it is as soft as the real one: what
@@ -377,7 +377,7 @@ class Search:
         gain = current.deviance - better.deviance
         return gain > needed_gain(better.candidates[-1], len(self.candidates))
 
-    def _pruned(self, current: Examined) -> Examined:
+    def _pruned(self, current: Diagnostics) -> Diagnostics:
         """Drop effects that turn out to be superfluous, or too small to be themselves, beside the others."""
         have = current.hypothesis.candidates
         if len(have) < 2:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from srs_opt.discrepancy.examined import ADEQUATE, Examined, explained
+from srs_opt.discrepancy.diagnostics import ADEQUATE, Diagnostics, explained
 from srs_opt.discrepancy.seal import Gap
 from srs_opt.discrepancy.select import Selection
 from srs_opt.discrepancy.settings import SETTINGS, Settings
@@ -23,8 +23,8 @@ class Verdict:
 
 
 def judge(
-    null: Examined,
-    best: Examined,
+    null: Diagnostics,
+    best: Diagnostics,
     selection: Selection | None,
     gap: Gap | None,
     settings: Settings = SETTINGS,
@@ -81,7 +81,9 @@ def _no_gap(gap: Gap | None, p: float, settings: Settings) -> Verdict:
     )
 
 
-def _doubt(null: Examined, best: Examined, selection: Selection, gap: Gap | None, settings: Settings) -> str:
+def _doubt(
+    null: Diagnostics, best: Diagnostics, selection: Selection, gap: Gap | None, settings: Settings
+) -> str:
     """Return what counts against the best set of effects; empty when nothing does."""
     against = selection.best.implausible()
     if against:
@@ -144,7 +146,7 @@ def _small(gap: Gap) -> str:
     )
 
 
-def _further(best: Examined, gap: Gap | None) -> str:
+def _further(best: Diagnostics, gap: Gap | None) -> str:
     """Return what is told beside a name: a remainder that is significant."""
     if gap is None or best.adequate or gap.after.m < 2e-5:
         return ""

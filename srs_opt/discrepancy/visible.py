@@ -12,7 +12,7 @@ from srs_opt.calibrate.experiment import Experiment, Point
 from srs_opt.calibrate.noise import track_of
 from srs_opt.calibrate.normal_equations import RANK
 from srs_opt.calibrate.objective import priors, projected, sum_eliminated
-from srs_opt.discrepancy.examined import Examined, needed_gain
+from srs_opt.discrepancy.diagnostics import Diagnostics, needed_gain
 from srs_opt.discrepancy.hypothesis import LARGE
 from srs_opt.discrepancy.motions import motion_errors
 from srs_opt.discrepancy.settings import SETTINGS, Settings
@@ -55,7 +55,7 @@ class Visible:
 
 def visible(
     experiment: Experiment,
-    null: Examined,
+    null: Diagnostics,
     candidates: Sequence[Candidate],
     trials: Sequence[Trial],
     settings: Settings = SETTINGS,

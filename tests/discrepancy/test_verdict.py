@@ -12,7 +12,7 @@ from srs_opt.discrepancy.verdict import judge
 from srs_opt.measurement.records import Trial
 
 
-def examined(p, misfit=1.0):
+def diagnostics(p, misfit=1.0):
     fit = SimpleNamespace(misfit_ratio=misfit)
     return SimpleNamespace(
         detection=SimpleNamespace(p_value=p),
@@ -39,7 +39,7 @@ def gap(before_m, after_m, speed=0.0, rival_m=None):
 
 
 def said(left_p, *arguments, misfit=1.05, **options):
-    return judge(examined(1e-9, 80.0), examined(left_p, misfit), *arguments, **options)
+    return judge(diagnostics(1e-9, 80.0), diagnostics(left_p, misfit), *arguments, **options)
 
 
 def test_a_significant_but_small_remainder_does_not_cost_the_name_and_is_told_beside_it():
@@ -72,9 +72,9 @@ def test_a_gap_too_small_to_matter_is_none_and_says_how_small():
 
 
 def test_sealed_trials_that_are_missed_are_a_gap_whatever_the_open_ones_say():
-    verdict = judge(examined(0.4), examined(0.4), chosen(), gap(92e-3, 92e-3))
+    verdict = judge(diagnostics(0.4), diagnostics(0.4), chosen(), gap(92e-3, 92e-3))
     assert verdict.word == "unknown" and "92 mm" in verdict.why
-    assert judge(examined(0.4), examined(0.4), chosen(), gap(0.1e-3, 0.1e-3)).word == "no_gap"
+    assert judge(diagnostics(0.4), diagnostics(0.4), chosen(), gap(0.1e-3, 0.1e-3)).word == "no_gap"
 
 
 def test_rivals_and_what_is_implausible_abstain():

@@ -22,7 +22,7 @@ FALSE_NAME = 0.002  # family-wise level for adding an effect
 
 
 @dataclass(frozen=True)
-class Examined:
+class Diagnostics:
     """A hypothesis with its tests.
 
     Attributes
@@ -49,32 +49,32 @@ class Examined:
         return self.detection.p_value > ADEQUATE
 
 
-def explained(null: Examined, examined: Examined) -> bool:
+def explained(null: Diagnostics, diagnostics: Diagnostics) -> bool:
     """Whether nothing is left of the gap, or no more than the smoothing of friction can leave."""
-    if examined.adequate:
+    if diagnostics.adequate:
         return True
-    family = len(examined.scores)
+    family = len(diagnostics.scores)
     if any(
         s.relative_size >= TELLING and s.improvement > needed_gain(s.candidate, family)
-        for s in examined.scores
+        for s in diagnostics.scores
     ):
         return False
-    left = examined.hypothesis.fit.misfit_ratio - 1
+    left = diagnostics.hypothesis.fit.misfit_ratio - 1
     gap = null.hypothesis.fit.misfit_ratio - 1
     return left < OF_NOISE and left < OF_GAP * gap
 
 
-def explainable(examined: Examined) -> bool:
+def explainable(diagnostics: Diagnostics) -> bool:
     """Whether one more known effect, at a size that matters, promises to close half of what is left.
 
     As the linearisation has it, the noise taken for as large as the misfit makes it.
     """
-    fit = examined.hypothesis.fit
+    fit = diagnostics.hypothesis.fit
     left = excess_of(fit.equations) / fit.variance_inflation
-    family = len(examined.scores)
+    family = len(diagnostics.scores)
     return any(
         s.relative_size >= TELLING and s.improvement > max(PROMISED * left, needed_gain(s.candidate, family))
-        for s in examined.scores
+        for s in diagnostics.scores
     )
 
 
