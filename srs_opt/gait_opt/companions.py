@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait, Wave
-from srs_opt.gait_opt.aim import end_for_end, in_step, leaned
+from srs_opt.gait_opt.corrections import duty_biased, end_for_end, in_step
 from srs_opt.gait_opt.table import GaitTable, TableGait
 from srs_opt.orbit.steady import steady_gait
 from srs_opt.robot import Robot
@@ -18,7 +18,7 @@ SLOWEST_M_S = 0.03
 
 
 def leaned_family(robot: Robot, gait: Gait, model: str = "complex") -> GaitTable:
-    """Return a straight gait leaned to either side, forward and backward, in the controller's ticks.
+    """Return a straight gait duty-biased to either side, forward and backward, in the controller's ticks.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ def leaned_family(robot: Robot, gait: Gait, model: str = "complex") -> GaitTable
     model : {"complex", "simplified"}
     """
     # an offset makes a wave's on-intervals longer by asin(offset)/pi of the cycle
-    return _family(robot, lambda offset: leaned(gait, math.asin(offset) / math.pi), model)
+    return _family(robot, lambda offset: duty_biased(gait, math.asin(offset) / math.pi), model)
 
 
 def wave_family(
@@ -56,8 +56,8 @@ def _family(robot: Robot, leaning: Callable[[float], Gait], model: str) -> GaitT
 
 
 def leaned_gaits(gait: Gait, tick_s: float) -> list[tuple[str, Gait]]:
-    """Return a straight gait leaned to either side, forward and backward, by name."""
-    return _gaits(lambda offset: leaned(gait, math.asin(offset) / math.pi), tick_s)
+    """Return a straight gait duty-biased to either side, forward and backward, by name."""
+    return _gaits(lambda offset: duty_biased(gait, math.asin(offset) / math.pi), tick_s)
 
 
 def _gaits(leaning: Callable[[float], Gait], tick_s: float) -> list[tuple[str, Gait]]:

@@ -10,9 +10,9 @@ from functools import partial
 import casadi as ca
 
 from srs_opt.errors import NoAnswerError
-from srs_opt.gait_opt.aim import in_step
 from srs_opt.gait_opt.certificate import certify, self_clearance_m
 from srs_opt.gait_opt.collocation.problem import CycleProblem
+from srs_opt.gait_opt.corrections import in_step
 from srs_opt.gait_opt.finish import finished
 from srs_opt.gait_opt.goal import STRAIGHT_RAD_S, Goal, Limits
 from srs_opt.gait_opt.objectives.cycle import GaitCycle

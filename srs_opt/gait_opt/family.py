@@ -10,8 +10,8 @@ from typing import Any
 
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait, published_wave
-from srs_opt.gait_opt.aim import end_for_end, in_step
 from srs_opt.gait_opt.collocation.problem import CycleProblem
+from srs_opt.gait_opt.corrections import end_for_end, in_step
 from srs_opt.gait_opt.driver import driver_gaits
 from srs_opt.gait_opt.entries import certified_table
 from srs_opt.gait_opt.finish import finished

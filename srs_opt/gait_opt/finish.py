@@ -8,9 +8,9 @@ import numpy as np
 
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait
-from srs_opt.gait_opt.aim import aimed, evened, on_ticks
 from srs_opt.gait_opt.certificate import LIMIT_EXCESS, SPEED_ERROR, Certificate, certify
 from srs_opt.gait_opt.collocation.problem import CycleProblem
+from srs_opt.gait_opt.corrections import on_ticks, steered, symmetrized
 from srs_opt.gait_opt.ladder import Report, orbits_of
 from srs_opt.gait_opt.prices import of_ticks
 from srs_opt.gait_opt.score import Score, score
@@ -112,13 +112,13 @@ def rounded(problem: CycleProblem, gait: Gait) -> Gait:
     gait = on_ticks(exact, limits.tick_s, limits.frequency_hz)
     straight = goal.turn == "straight" or goal.turn_rate_rad_s == 0
     if straight and all(len(pairs) == 1 for pairs in gait.intervals):
-        even = on_ticks(evened(exact), limits.tick_s, limits.frequency_hz)
+        even = on_ticks(symmetrized(exact), limits.tick_s, limits.frequency_hz)
         as_found = _score(problem, gait)
         if _score(problem, even).total > as_found.total - _LOST * as_found.scale:
             return even
     if goal.turn in ("side", "any"):
         return gait
-    return on_ticks(aimed(gait, turn_miss(problem), _TURN_RAD_S, 0.1), limits.tick_s, limits.frequency_hz)
+    return on_ticks(steered(gait, turn_miss(problem), _TURN_RAD_S, 0.1), limits.tick_s, limits.frequency_hz)
 
 
 def _score(problem: CycleProblem, gait: Gait) -> Score:

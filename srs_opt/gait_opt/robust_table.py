@@ -14,8 +14,8 @@ import numpy as np
 
 from srs_opt.errors import InputError, NoAnswerError
 from srs_opt.gait import Gait, published_wave
-from srs_opt.gait_opt.aim import on_ticks
 from srs_opt.gait_opt.companions import leaned_gaits
+from srs_opt.gait_opt.corrections import on_ticks
 from srs_opt.gait_opt.entries import certified_table
 from srs_opt.gait_opt.goal import STRAIGHT_RAD_S, Limits
 from srs_opt.gait_opt.replayed import SLOWEST_M_S
@@ -28,7 +28,7 @@ Say = Callable[[str], None]
 
 
 def robust_companions(robot: Robot, limits: Limits) -> list[tuple[str, Gait]]:
-    """Return the robust gait, straight and leaned, by name; none for robots with other segments."""
+    """Return the robust gait, straight and duty-biased, by name; none for robots with other segments."""
     gait = robust_beside(robot, limits)
     if gait is None:
         return []

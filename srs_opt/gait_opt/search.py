@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait
-from srs_opt.gait_opt.aim import within
 from srs_opt.gait_opt.certificate import Certificate
 from srs_opt.gait_opt.collocation.problem import CycleProblem
+from srs_opt.gait_opt.corrections import within
 from srs_opt.gait_opt.finish import topped
 from srs_opt.gait_opt.from_rest import FromRest, misled, search_from_rest
 from srs_opt.gait_opt.goal import Goal

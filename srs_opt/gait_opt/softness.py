@@ -7,7 +7,7 @@ from importlib import resources
 
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait
-from srs_opt.gait_opt.aim import within
+from srs_opt.gait_opt.corrections import within
 from srs_opt.gait_opt.goal import Limits
 from srs_opt.gait_opt.robust import of_stiffness
 from srs_opt.orbit.steady import steady_gaits

@@ -11,8 +11,8 @@ import numpy as np
 
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait, Wave, published_wave
-from srs_opt.gait_opt.aim import aimed
 from srs_opt.gait_opt.collocation.problem import CycleProblem
+from srs_opt.gait_opt.corrections import steered
 from srs_opt.gait_opt.goal import Goal
 from srs_opt.gait_opt.ladder import orbits_of
 from srs_opt.gait_opt.score import score
@@ -48,24 +48,24 @@ def starting_gaits(problem: CycleProblem, count: int, seed: int) -> list[Gait]:
 
 
 def steered(problem: CycleProblem, gait: Gait) -> Gait:
-    """Return the gait leaned towards the wanted turn, as far as smoothed friction lets it."""
+    """Return the gait duty-biased towards the wanted turn, as far as smoothed friction lets it."""
     goal = problem.goal
     robot = replace(problem.robots[0], friction_speed_m_s=_SMOOTHED_M_S)
     if goal.turn == "side":
         turn = goal.sense * _STEERED_RAD_S
         if goal.sense * steady_gait(robot, gait, problem.model).turn_rate_rad_s >= _STEERED_RAD_S:
             return gait
-        return aimed(gait, lambda g: steady_gait(robot, g, problem.model).turn_rate_rad_s - turn, 0.1)
+        return steered(gait, lambda g: steady_gait(robot, g, problem.model).turn_rate_rad_s - turn, 0.1)
     if goal.radius_m is None and not goal.turn_rate_rad_s:
         return gait
     try:
-        return aimed(gait, turn_miss(problem, _SMOOTHED_M_S), 0.05)
+        return steered(gait, turn_miss(problem, _SMOOTHED_M_S), 0.05)
     except NoAnswerError:
         return gait
 
 
 def best_start(problem: CycleProblem, gaits: Sequence[Gait]) -> Gait:
-    """Return the best, simulated, of some gaits leaned towards the wanted turn.
+    """Return the best, simulated, of some gaits duty-biased towards the wanted turn.
 
     Raises
     ------
@@ -76,7 +76,7 @@ def best_start(problem: CycleProblem, gaits: Sequence[Gait]) -> Gait:
     for k, start in enumerate(gaits):
         with suppress(NoAnswerError):
             if problem.goal.radius_m is not None:
-                start = aimed(start, turn_miss(problem), _AIM_RAD_S)
+                start = steered(start, turn_miss(problem), _AIM_RAD_S)
             found.append((score(problem, start, orbits_of(problem, start)).total, -k, start))
     if not found:
         raise NoAnswerError("no gait that the search could start from comes to a steady motion")

@@ -10,8 +10,8 @@ import numpy as np
 
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait
-from srs_opt.gait_opt.aim import evened
 from srs_opt.gait_opt.collocation.problem import CycleProblem
+from srs_opt.gait_opt.corrections import symmetrized
 from srs_opt.gait_opt.goal import tick_counts
 from srs_opt.gait_opt.ladder import orbits_of
 from srs_opt.gait_opt.score import score
@@ -134,7 +134,7 @@ def _starts(problem: CycleProblem, gait: Gait, rounded: Gait) -> Iterator[TickGa
         yield TickGait.of_gait(gait, period)
         yield TickGait.of_gait(rounded, period)
         if single and period % 2 == 0 and problem.goal.turn == "straight":
-            yield TickGait.of_gait(evened(gait), period)
+            yield TickGait.of_gait(symmetrized(gait), period)
 
 
 def _moves(gait: TickGait, pressure_kpa: tuple[float, float]) -> Iterator[TickGait]:

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from srs_opt.gait_opt.aim import within
 from srs_opt.gait_opt.catalogue import default_table, shipped_table
+from srs_opt.gait_opt.corrections import within
 from srs_opt.gait_opt.driver import Motion, driver_gaits
 from srs_opt.gait_opt.entries import certified_table
 from srs_opt.gait_opt.family import images

@@ -10,12 +10,12 @@ import pytest
 from srs_opt.errors import InputError
 from srs_opt.gait import Wave, published_wave
 from srs_opt.gait_opt import search as search_module
-from srs_opt.gait_opt.aim import on_ticks
 from srs_opt.gait_opt.certificate import certify
 from srs_opt.gait_opt.collocation.guess import gait_from, unknowns_from_orbits
 from srs_opt.gait_opt.collocation.layout import Mesh
 from srs_opt.gait_opt.collocation.problem import CycleProblem
 from srs_opt.gait_opt.collocation.solver import Solver
+from srs_opt.gait_opt.corrections import on_ticks
 from srs_opt.gait_opt.goal import Goal, Limits
 from srs_opt.gait_opt.ladder import Rung, orbits_of, solve_from
 from srs_opt.gait_opt.objectives.objective import Objective

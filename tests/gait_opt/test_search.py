@@ -15,9 +15,17 @@ from srs_opt.errors import InputError, NoAnswerError
 from srs_opt.gait import Gait, Wave, published_wave
 from srs_opt.gait_opt import search as search_module
 from srs_opt.gait_opt.__main__ import main
-from srs_opt.gait_opt.aim import aimed, end_for_end, evened, in_step, leaned, on_ticks, within
 from srs_opt.gait_opt.certificate import certify, periodicity_gap, self_clearance_m
 from srs_opt.gait_opt.collocation.problem import CycleProblem
+from srs_opt.gait_opt.corrections import (
+    duty_biased,
+    end_for_end,
+    in_step,
+    on_ticks,
+    steered,
+    symmetrized,
+    within,
+)
 from srs_opt.gait_opt.goal import Goal, Limits, air_work_j, chamber_volume_m3
 from srs_opt.gait_opt.ladder import Rung, climb, orbits_of
 from srs_opt.gait_opt.population import evolved
@@ -229,7 +237,7 @@ def test_certificate_finds_faults():
     for fault in ("optimizer's 0.3000", "curvature reaches", "swept band"):
         assert fault in words
     tight = CycleProblem((ROBOT,), "complex", Goal(), Limits(min_dwell_s=0.2499))
-    assert certify(tight, leaned(gait, 0.05), (0.2,))[0].dwell_ok is False
+    assert certify(tight, duty_biased(gait, 0.05), (0.2,))[0].dwell_ok is False
 
 
 def test_collocation_of_a_held_gait_agrees_with_simulation():
@@ -257,14 +265,14 @@ def test_self_clearance_of_a_long_robot():
 
 def test_aiming_hits_a_turn_rate():
     gait = published_wave(ROBOT, 2.0, 50.0).gait()
-    hit = aimed(gait, lambda g: steady_gait(ROBOT, g).turn_rate_rad_s - 0.6, 1e-2)
+    hit = steered(gait, lambda g: steady_gait(ROBOT, g).turn_rate_rad_s - 0.6, 1e-2)
     assert steady_gait(ROBOT, hit).turn_rate_rad_s == pytest.approx(0.6, abs=0.011)
 
 
 def test_leaning_stops_before_intervals_meet():
     pairs = ((0.0, 0.1), (0.11, 0.25))
     with pytest.raises(NoAnswerError):
-        leaned(Gait(0.5, 45.0, (pairs,) * 4), 0.05)
+        duty_biased(Gait(0.5, 45.0, (pairs,) * 4), 0.05)
 
 
 def test_end_for_end_backs_up_exactly():
@@ -276,7 +284,7 @@ def test_end_for_end_backs_up_exactly():
 
 def test_ticks_and_limits():
     gait = Wave(1.97, 45.0, (0.2, 1.0, 1.9, 2.6), (0.0, 0.0, 0.0, 0.0)).gait()
-    played = on_ticks(evened(gait), 0.001, (1.0, 2.0))
+    played = on_ticks(symmetrized(gait), 0.001, (1.0, 2.0))
     assert played.period_s == pytest.approx(0.508)
     for ((on, off),) in played.intervals:
         assert (off - on) % played.period_s == pytest.approx(played.period_s / 2)
@@ -350,7 +358,7 @@ def test_unknown_objective():
 
 
 def test_in_step_moves_the_cycle_only():
-    gait = leaned(Wave.uniform(4, 2.0, 40.0, 0.9).gait(), 0.2).mirrored()
+    gait = duty_biased(Wave.uniform(4, 2.0, 40.0, 0.9).gait(), 0.2).mirrored()
     stepped = in_step(on_ticks(gait, 0.001), 0.001)
     assert abs(stepped.wave_phase_rad()) < 2 * np.pi * 0.001 / stepped.period_s
     assert stepped.period_s == gait.period_s

@@ -11,11 +11,11 @@ from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait
 from srs_opt.gait_opt.goal import Limits
 
-_LONGEST_LEAN = 0.35  # cycles by which on-intervals may grow at the expense of off-intervals
+_LARGEST_BIAS = 0.35  # cycles by which on-intervals may grow at the expense of off-intervals
 _LEAST_SHARE = 0.04  # of a cycle, that any interval keeps
 
 
-def leaned(gait: Gait, cycles: float) -> Gait:
+def duty_biased(gait: Gait, cycles: float) -> Gait:
     """Return the gait with every on-interval longer by `cycles` of the period (it turns further left)."""
     period = gait.period_s
     change = cycles * period / 2
@@ -36,8 +36,8 @@ def leaned(gait: Gait, cycles: float) -> Gait:
     return replace(gait, intervals=pairs)
 
 
-def aimed(gait: Gait, miss: Callable[[Gait], float], tolerance: float, most: float = _LONGEST_LEAN) -> Gait:
-    """Return the gait leaned so that ``miss(gait)``, which grows with turning left, is zero.
+def steered(gait: Gait, miss: Callable[[Gait], float], tolerance: float, most: float = _LARGEST_BIAS) -> Gait:
+    """Return the gait duty-biased so that ``miss(gait)``, which grows with turning left, is zero.
 
     The nearest miss is returned where zero is out of reach.
     """
@@ -46,7 +46,7 @@ def aimed(gait: Gait, miss: Callable[[Gait], float], tolerance: float, most: flo
     def at(lean: float) -> float:
         if lean not in tried:
             try:
-                tried[lean] = miss(leaned(gait, lean))
+                tried[lean] = miss(duty_biased(gait, lean))
             except NoAnswerError:
                 tried[lean] = np.nan
         return tried[lean]
@@ -61,11 +61,11 @@ def aimed(gait: Gait, miss: Callable[[Gait], float], tolerance: float, most: flo
         if np.isnan(value):
             break
         if value * at(below) <= 0:
-            return leaned(gait, _bisected(at, below, above, tolerance))
+            return duty_biased(gait, _bisected(at, below, above, tolerance))
         below, step = above, 1.5 * step
     known = {k: abs(v) for k, v in tried.items() if not np.isnan(v)}
     best = min(known, key=known.__getitem__)
-    return leaned(gait, best) if best else gait
+    return duty_biased(gait, best) if best else gait
 
 
 def _bisected(at: Callable[[float], float], a: float, b: float, tolerance: float) -> float:
@@ -89,7 +89,7 @@ def end_for_end(gait: Gait) -> Gait:
     return replace(gait, intervals=tuple(reversed(gait.mirrored().intervals)))
 
 
-def evened(gait: Gait) -> Gait:
+def symmetrized(gait: Gait) -> Gait:
     """Return the gait with every single on-interval made exactly half a cycle long (it runs straight)."""
     period = gait.period_s
     rows = []
