@@ -13,10 +13,10 @@ from srs_opt.errors import NoAnswerError
 from srs_opt.gait_opt.certificate import certify, self_clearance_m
 from srs_opt.gait_opt.collocation.problem import CycleProblem
 from srs_opt.gait_opt.corrections import in_step
-from srs_opt.gait_opt.finish import finished
 from srs_opt.gait_opt.goal import STRAIGHT_RAD_S, Goal, Limits
 from srs_opt.gait_opt.objectives.cycle import GaitCycle
 from srs_opt.gait_opt.objectives.objective import Objective
+from srs_opt.gait_opt.polish import quantized
 from srs_opt.gait_opt.switch_times import collocated_speeds
 from srs_opt.gait_opt.table import LEVER_M, EntryCertificate, GaitTable, TableGait
 from srs_opt.parallel import executor
@@ -123,7 +123,7 @@ def _on_ticks(work: _Work, entry: TableGait) -> tuple[TableGait | None, str]:
     goal = replace(Goal(like), turn_rate_rad_s=0.0) if straight else Goal(like)
     problem = CycleProblem((work.robot,), work.model, goal, wide)
     try:
-        near = in_step(finished(problem, gait), limits.tick_s)
+        near = in_step(quantized(problem, gait), limits.tick_s)
         (orbit,) = certify(problem, near, (entry.speed_m_s,))[1]
     except NoAnswerError as error:
         return None, str(error)

@@ -14,9 +14,9 @@ from srs_opt.gait_opt.collocation.problem import CycleProblem
 from srs_opt.gait_opt.corrections import end_for_end, in_step
 from srs_opt.gait_opt.driver import driver_gaits
 from srs_opt.gait_opt.entries import certified_table
-from srs_opt.gait_opt.finish import finished
 from srs_opt.gait_opt.goal import LEAST_SPEED_M_S, STRAIGHT_RAD_S, Goal, Limits
 from srs_opt.gait_opt.ladder import Climb, Rung, climb, ladder
+from srs_opt.gait_opt.polish import quantized
 from srs_opt.gait_opt.score import score
 from srs_opt.gait_opt.starts import best_start, plain_waves
 from srs_opt.gait_opt.table import GaitTable, TableGait
@@ -121,7 +121,7 @@ def _fulfil(work: Work, task: Task) -> dict[str, Any]:
     problem = CycleProblem((wish.laden(work.robot),), work.model, goal, work.limits)
     try:
         found = _solve(problem, task)
-        gait = finished(problem, found.gait)
+        gait = quantized(problem, found.gait)
         gaits = images(work.robot, work.model, wish.name, gait, work.limits.tick_s)
     except NoAnswerError as error:
         return {"gaits": [], "next": None, "line": f"{wish.name}: left out, {error}"}

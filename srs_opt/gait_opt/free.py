@@ -13,8 +13,8 @@ from srs_opt.gait import Gait
 from srs_opt.gait_opt.collocation.guess import unknowns_from_orbits
 from srs_opt.gait_opt.collocation.layout import PRESSURE_UNIT_KPA, Mesh
 from srs_opt.gait_opt.collocation.problem import CycleProblem
-from srs_opt.gait_opt.finish import topped
 from srs_opt.gait_opt.ladder import Rung, bounded, climb, orbits_of
+from srs_opt.gait_opt.polish import polished
 from srs_opt.gait_opt.score import score
 from srs_opt.gait_opt.search import HERE, Found, Where, search
 
@@ -180,7 +180,7 @@ def _refined(problem: CycleProblem, gait: Gait, wave: Found, say: Callable[[str]
     rungs = (Rung(SMOOTHED_M_S, 60, 0.05, 6), Rung(max(own, 0.004), 70, 0.03, 3), Rung(own, 80, 0.02, 2))
     try:
         top = climb(problem, gait, rungs)
-        exact, certificate, orbits = topped(problem, top.gait, 0.01)
+        exact, certificate, orbits = polished(problem, top.gait, 0.01)
     except NoAnswerError as error:
         say(f"a rounded gait leads nowhere: {error}")
         return None

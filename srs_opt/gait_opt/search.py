@@ -14,10 +14,10 @@ from srs_opt.gait import Gait
 from srs_opt.gait_opt.certificate import Certificate
 from srs_opt.gait_opt.collocation.problem import CycleProblem
 from srs_opt.gait_opt.corrections import within
-from srs_opt.gait_opt.finish import topped
 from srs_opt.gait_opt.from_rest import FromRest, misled, search_from_rest
 from srs_opt.gait_opt.goal import Goal
 from srs_opt.gait_opt.ladder import Climb, Rung, Step, climb, ladder, orbits_of
+from srs_opt.gait_opt.polish import polished
 from srs_opt.gait_opt.population import populations
 from srs_opt.gait_opt.prices import Price
 from srs_opt.gait_opt.reach import refuse_contradictions
@@ -187,7 +187,7 @@ def search(
         say("collocated orbits are not those reached from rest: a search by simulation from rest")
         settled = search_from_rest(problem, reached, seed)
         reached, interrupted = settled.gait, settled.interrupted
-    exact, certificate, orbits = topped(problem, reached, reach, _reporter(say, best, len(candidates)))
+    exact, certificate, orbits = polished(problem, reached, reach, _reporter(say, best, len(candidates)))
     if warm is not None and not certificate.passed and not interrupted:
         say(f"the earlier gait leads to none that holds ({certificate.failures[0]}): the whole search")
         return search(problem, starts, seed, say, where=where)

@@ -8,7 +8,7 @@ from test_collocation import derivative_errors, held_gait
 
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Wave, published_wave
-from srs_opt.gait_opt import finish, from_rest
+from srs_opt.gait_opt import from_rest, polish
 from srs_opt.gait_opt.collocation.guess import unknowns_from_orbits
 from srs_opt.gait_opt.collocation.layout import Mesh
 from srs_opt.gait_opt.collocation.problem import CycleProblem
@@ -131,6 +131,6 @@ def test_what_was_given_is_kept_where_no_better_gait_has_a_steady_motion(monkeyp
     monkeypatch.setattr(finish, "optimize_switch_times", lost)
     rigid = CycleProblem((wpi_srs(),), "complex", Goal("speed"), Limits())
     gait = published_wave(wpi_srs(), 2.0, 55.0).gait()
-    exact, certificate, orbits = finish.topped(rigid, gait, 0.02)
-    assert exact.gait == orbits[0].gait == finish.rounded(rigid, gait)
+    exact, certificate, orbits = polish.polished(rigid, gait, 0.02)
+    assert exact.gait == orbits[0].gait == polish.rounded(rigid, gait)
     assert certificate.passed

@@ -8,8 +8,8 @@ from srs_opt.errors import InputError
 from srs_opt.gait_opt.catalogue import shipped_table
 from srs_opt.gait_opt.certificate import certify
 from srs_opt.gait_opt.collocation.problem import CycleProblem
-from srs_opt.gait_opt.finish import finished
 from srs_opt.gait_opt.goal import Goal, Limits, tick_counts
+from srs_opt.gait_opt.polish import quantized
 from srs_opt.gait_opt.switch_times import collocated_speeds
 from srs_opt.gait_opt.ticks import Schedule
 from srs_opt.robot import wpi_srs
@@ -25,7 +25,7 @@ def problem(tick_s: float, **wanted) -> CycleProblem:
 @pytest.mark.parametrize(("tick_s", "least_m_s"), [(0.02, 0.5425), (0.03, 0.53), (0.05, 0.49)])
 def test_the_fastest_gait_is_found_on_the_grid_and_certified_there(tick_s, least_m_s):
     asked = problem(tick_s)
-    gait = finished(asked, replace(shipped_table()["fast"].gait, pressure_kpa=41.0))
+    gait = quantized(asked, replace(shipped_table()["fast"].gait, pressure_kpa=41.0))
     assert Schedule.of_gait(gait, tick_s).period == round(gait.period_s / tick_s)
     certificate, _ = certify(asked, gait, collocated_speeds(asked, gait))
     assert certificate.passed, certificate.failures
@@ -34,7 +34,7 @@ def test_the_fastest_gait_is_found_on_the_grid_and_certified_there(tick_s, least
 
 def test_a_wanted_radius_is_kept_on_the_grid():
     asked = problem(0.02, objective="turn", radius_m=0.314)
-    gait = finished(asked, replace(shipped_table()["fast R0.314 left"].gait, pressure_kpa=41.0))
+    gait = quantized(asked, replace(shipped_table()["fast R0.314 left"].gait, pressure_kpa=41.0))
     certificate, _ = certify(asked, gait, collocated_speeds(asked, gait))
     assert certificate.passed, certificate.failures
     assert certificate.speed_m_s > 0.45

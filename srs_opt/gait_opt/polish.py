@@ -24,7 +24,7 @@ _LOST = 1e-3  # merit that an exactly straight gait may cost
 _ROUNDS = 3
 
 
-def topped(
+def polished(
     problem: CycleProblem, gait: Gait, reach: float, report: Report | None = None
 ) -> tuple[Polished, Certificate, tuple[Orbit, ...]]:
     """Return what the switch times' optimization made of `gait`, and the finished gait's certificate, orbits.
@@ -34,7 +34,7 @@ def topped(
     certificate, the given one is kept; so it is where a soft body has no steady motion with what was found.
     """
     try:
-        return _topped(problem, gait, reach, report)
+        return _polished(problem, gait, reach, report)
     except NoAnswerError:
         plain = rounded(problem, gait)
         speeds = tuple(orbit.speed_m_s for orbit in orbits_of(problem, plain))
@@ -42,13 +42,13 @@ def topped(
         return (Polished(plain, orbits, score(problem, plain, orbits), speeds, ()), certificate, orbits)
 
 
-def _topped(
+def _polished(
     problem: CycleProblem, gait: Gait, reach: float, report: Report | None
 ) -> tuple[Polished, Certificate, tuple[Orbit, ...]]:
     asked, given = problem, gait
     for _ in range(_ROUNDS):
         exact = optimize_switch_times(asked, gait, reach, report)
-        played = finished(problem, exact.gait)
+        played = quantized(problem, exact.gait)
         certificate, orbits = certify(problem, played, _claimed(problem, exact, played))
         less = _less_asked(problem, asked, orbits)
         if less is None:
@@ -96,7 +96,7 @@ def _less_asked(problem: CycleProblem, asked: CycleProblem, orbits: tuple[Orbit,
     return None if (goal, limits) == (asked.goal, asked.limits) else replace(asked, goal=goal, limits=limits)
 
 
-def finished(problem: CycleProblem, gait: Gait) -> Gait:
+def quantized(problem: CycleProblem, gait: Gait) -> Gait:
     """Return the gait on ticks; where rounding costs something, the best one that a search on ticks finds."""
     near = rounded(problem, gait)
     exact = _score(problem, gait)
