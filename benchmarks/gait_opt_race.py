@@ -16,8 +16,8 @@ from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait, Wave
 from srs_opt.gait_opt.collocation import program as program_module
 from srs_opt.gait_opt.collocation.problem import CycleProblem
+from srs_opt.gait_opt.continuation import continuation_stages, run_stages
 from srs_opt.gait_opt.goal import Goal, Limits
-from srs_opt.gait_opt.ladder import climb, ladder
 from srs_opt.gait_opt.report import wave_parameters
 from srs_opt.gait_opt.starts import starting_gaits
 from srs_opt.orbit import steady
@@ -111,10 +111,10 @@ def watched() -> Iterator[Watch]:
 
 
 def by_collocation(start: Gait, seed: int) -> None:
-    """Climb the ladder from the start, then from others, as the command does."""
-    climb(PROBLEM, start, ladder(ROBOT.friction_speed_m_s, quick=True))
+    """Continuation the ladder from the start, then from others, as the command does."""
+    run_stages(PROBLEM, start, continuation_stages(ROBOT.friction_speed_m_s, quick=True))
     for other in starting_gaits(PROBLEM, 8, seed + 100):
-        climb(PROBLEM, other, ladder(ROBOT.friction_speed_m_s, quick=True))
+        run_stages(PROBLEM, other, continuation_stages(ROBOT.friction_speed_m_s, quick=True))
 
 
 LOW = np.array([1.0, 41.0, *[-math.pi] * 3, *[-0.9] * 4])

@@ -11,11 +11,11 @@ from typing import Any
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait, published_wave
 from srs_opt.gait_opt.collocation.problem import CycleProblem
+from srs_opt.gait_opt.continuation import Continuation, Stage, continuation_stages, run_stages
 from srs_opt.gait_opt.corrections import end_for_end, in_step
 from srs_opt.gait_opt.driver import driver_gaits
 from srs_opt.gait_opt.entries import certified_table
 from srs_opt.gait_opt.goal import LEAST_SPEED_M_S, STRAIGHT_RAD_S, Goal, Limits
-from srs_opt.gait_opt.ladder import Climb, Rung, climb, ladder
 from srs_opt.gait_opt.polish import quantized
 from srs_opt.gait_opt.score import score
 from srs_opt.gait_opt.starts import best_start, plain_waves
@@ -146,7 +146,7 @@ def _kept(wish: Wish, entry: TableGait) -> bool:
     return entry.radius_m is not None and abs(entry.radius_m / wish.radius_m - 1) < _RADIUS_ERROR
 
 
-def _solve(problem: CycleProblem, task: Task) -> Climb:
+def _solve(problem: CycleProblem, task: Task) -> Continuation:
     """Return the best climb from the neighbour's gait and plain waves.
 
     A band makes starts hard to compare before they are optimized: then the best of either kind is.
@@ -154,21 +154,21 @@ def _solve(problem: CycleProblem, task: Task) -> Climb:
     neighbour, waves = [task.start], plain_waves(problem)
     band = task.wish.band_m
     kinds = [neighbour + waves] if band is None else [neighbour, waves]
-    found = [_climbed(problem, best_start(problem, gaits), task.wish) for gaits in kinds]
+    found = [_continued(problem, best_start(problem, gaits), task.wish) for gaits in kinds]
     return max(found, key=lambda climb: climb.score.total)
 
 
-def _climbed(problem: CycleProblem, start: Gait, wish: Wish) -> Climb:
+def _continued(problem: CycleProblem, start: Gait, wish: Wish) -> Continuation:
     own = problem.robots[0].friction_speed_m_s
     if wish.after is None:
-        return climb(problem, start, ladder(own))
-    last = Rung(own, 70, 0.03, 2)
-    found = climb(problem, start, (Rung(max(own, 0.004), 60, 0.06, 3), last))
+        return run_stages(problem, start, continuation_stages(own))
+    last = Stage(own, 70, 0.03, 2)
+    found = run_stages(problem, start, (Stage(max(own, 0.004), 60, 0.06, 3), last))
     band = wish.band_m
     if band is not None and (excess := sum(found.orbits[0].envelope_m) - band) > _BAND_EXCESS * band:
         # the mesh sees the body's reach at some instants only: ask for less by as much as it missed
         less = replace(problem, goal=replace(problem.goal, envelope_m=band - excess))
-        again = climb(less, found.gait, (last,))
+        again = run_stages(less, found.gait, (last,))
         found = replace(again, score=score(problem, again.gait, again.orbits))
     return found
 

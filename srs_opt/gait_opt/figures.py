@@ -33,7 +33,7 @@ def convergence_figure(found: Found) -> Figure:
     )
     bottom.axhline(0.005, color="black", linewidth=0.8, linestyle="--")
     bottom.set(ylabel="relative error", xlabel="smoothing speed of friction (mm/s), elements")
-    bottom.set_xticks(number, [f"{_MM * s.rung.friction_speed_m_s:g}\n{s.elements}" for s in steps])
+    bottom.set_xticks(number, [f"{_MM * s.stage.friction_speed_m_s:g}\n{s.elements}" for s in steps])
     return figure
 
 

@@ -13,7 +13,7 @@ from srs_opt.gait import Gait
 from srs_opt.gait_opt.collocation.guess import unknowns_from_orbits
 from srs_opt.gait_opt.collocation.layout import PRESSURE_UNIT_KPA, Mesh
 from srs_opt.gait_opt.collocation.problem import CycleProblem
-from srs_opt.gait_opt.ladder import Rung, bounded, climb, orbits_of
+from srs_opt.gait_opt.continuation import Stage, bounded, orbits_of, run_stages
 from srs_opt.gait_opt.polish import polished
 from srs_opt.gait_opt.score import score
 from srs_opt.gait_opt.search import HERE, Found, Where, search
@@ -175,11 +175,11 @@ def _total(problem: CycleProblem, found: Found) -> float:
 
 
 def _refined(problem: CycleProblem, gait: Gait, wave: Found, say: Callable[[str], None]) -> Found | None:
-    """Take one on/off gait up the last rungs and optimize its switch times exactly."""
+    """Take one on/off gait up the last stages and optimize its switch times exactly."""
     own = max(r.friction_speed_m_s for r in problem.robots)
-    rungs = (Rung(SMOOTHED_M_S, 60, 0.05, 6), Rung(max(own, 0.004), 70, 0.03, 3), Rung(own, 80, 0.02, 2))
+    stages = (Stage(SMOOTHED_M_S, 60, 0.05, 6), Stage(max(own, 0.004), 70, 0.03, 3), Stage(own, 80, 0.02, 2))
     try:
-        top = climb(problem, gait, rungs)
+        top = run_stages(problem, gait, stages)
         exact, certificate, orbits = polished(problem, top.gait, 0.01)
     except NoAnswerError as error:
         say(f"a rounded gait leads nowhere: {error}")

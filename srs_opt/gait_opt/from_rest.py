@@ -20,8 +20,8 @@ import numpy as np
 from srs_opt.gait import Gait
 from srs_opt.gait_opt.certificate import STANDING_START, standing_start
 from srs_opt.gait_opt.collocation.problem import CycleProblem
+from srs_opt.gait_opt.continuation import Step, orbits_of
 from srs_opt.gait_opt.corrections import on_ticks
-from srs_opt.gait_opt.ladder import Step, orbits_of
 from srs_opt.gait_opt.population import Coordinates, simulated_costs
 
 MISLED = 0.05  # collocation against simulation from rest: beyond, the collocated orbit was another one

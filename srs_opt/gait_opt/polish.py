@@ -10,8 +10,8 @@ from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait
 from srs_opt.gait_opt.certificate import LIMIT_EXCESS, SPEED_ERROR, Certificate, certify
 from srs_opt.gait_opt.collocation.problem import CycleProblem
+from srs_opt.gait_opt.continuation import Report, orbits_of
 from srs_opt.gait_opt.corrections import on_ticks, steered, symmetrized
-from srs_opt.gait_opt.ladder import Report, orbits_of
 from srs_opt.gait_opt.prices import of_ticks
 from srs_opt.gait_opt.score import Score, score
 from srs_opt.gait_opt.starts import turn_miss

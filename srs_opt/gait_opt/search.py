@@ -13,10 +13,17 @@ from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait
 from srs_opt.gait_opt.certificate import Certificate
 from srs_opt.gait_opt.collocation.problem import CycleProblem
+from srs_opt.gait_opt.continuation import (
+    Continuation,
+    Stage,
+    Step,
+    continuation_stages,
+    orbits_of,
+    run_stages,
+)
 from srs_opt.gait_opt.corrections import within
 from srs_opt.gait_opt.from_rest import FromRest, misled, search_from_rest
 from srs_opt.gait_opt.goal import Goal
-from srs_opt.gait_opt.ladder import Climb, Rung, Step, climb, ladder, orbits_of
 from srs_opt.gait_opt.polish import polished
 from srs_opt.gait_opt.population import populations
 from srs_opt.gait_opt.prices import Price
@@ -39,7 +46,7 @@ _NEAR_REACH, _MOVED_REACH = 0.05, 0.02  # the same for earlier results that keep
 _BEYOND = 0.03  # share by which a wanted speed may exceed the fastest gait's before it is refused at once
 _SCATTER = 0.03  # share by which the best start may exceed the second: more, and the search goes on
 _KEPT = 5e-3  # miss below which a gait keeps the limits
-_MOVED = Rung(0.01, 36, 0.1, 2, quick=True)  # friction that forgives, for results that had to move
+_MOVED = Stage(0.01, 36, 0.1, 2, quick=True)  # friction that forgives, for results that had to move
 
 
 @dataclass(frozen=True)
@@ -65,7 +72,7 @@ class Found(Result):
     orbits : tuple of Orbit, one per robot
     certificate : Certificate
     merits : tuple of float
-        Best merit of every start that led somewhere, in their order (at the rung to which it was carried).
+        Best merit of every start that led somewhere, in their order (at the stage to which it was carried).
     populations : int
         How many of these, the last ones, are of populations of simulated gaits.
     steps : tuple of Step
@@ -152,9 +159,9 @@ def search(
     if warm is None:
         candidates = starting_gaits(problem, starts, seed)
         # tight turns and pivots have more optima than starts: a population alone does better, and sooner
-        rungs = () if _rugged(problem) else ladder(own, quick=problem.goal.only_fast)
-        cut = max(len([r for r in rungs if r.friction_speed_m_s >= 0.01]), len(rungs) - 2)
-        lower, upper = rungs[:cut], rungs[cut:]
+        stages = () if _rugged(problem) else continuation_stages(own, quick=problem.goal.only_fast)
+        cut = max(len([r for r in stages if r.friction_speed_m_s >= 0.01]), len(stages) - 2)
+        lower, upper = stages[:cut], stages[cut:]
         reach = _EXACT_REACH
     else:
         start, near = _warmed(problem, warm, say)
@@ -172,7 +179,7 @@ def search(
         carried, interrupted = _all(climbing, [(k, climbs[k].gait) for k in chosen], upper, where)
         for k, top in carried.items():
             climbs[k] = replace(top, steps=(*climbs[k].steps, *top.steps))
-    evolved: list[Climb] = []
+    evolved: list[Continuation] = []
     whole = warm is None and problem.intervals == 1
     astray = whole and misled([step for c in climbs.values() for step in c.steps])
     if not interrupted and whole and (_rugged(problem) or (_scatter(climbs) and not astray)):
@@ -211,15 +218,15 @@ def _rugged(problem: CycleProblem) -> bool:
     return problem.goal.turn == "side" and problem.intervals == 1
 
 
-def _scatter(climbs: dict[int, Climb]) -> bool:
+def _scatter(climbs: dict[int, Continuation]) -> bool:
     """Whether several starts led somewhere and no second one confirms the best."""
     totals = sorted((c.score.total for c in climbs.values()), reverse=True)
     return len(totals) > 1 and totals[0] - totals[1] > _SCATTER * abs(totals[0])
 
 
 def _evolved(
-    problem: CycleProblem, climbs: dict[int, Climb], starts: int, seed: int, say: Say, where: Where
-) -> tuple[list[Climb], bool]:
+    problem: CycleProblem, climbs: dict[int, Continuation], starts: int, seed: int, say: Say, where: Where
+) -> tuple[list[Continuation], bool]:
     """Return what populations of simulated gaits come to, and whether Ctrl-C ended them early."""
     totals = [c.score.total for c in climbs.values()]
     if _rugged(problem):
@@ -227,14 +234,14 @@ def _evolved(
     else:
         scatter = f"the starts scatter from {min(totals):.4f} to {max(totals):.4f}"
         say(f"{scatter}: populations of simulated gaits go on")
-    found: list[Climb] = []
+    found: list[Continuation] = []
     many = populations(
         problem, 2 * starts, seed, say, jobs=where.jobs, cluster=where.cluster, resume=where.resume
     )
     try:
         for gait in many:
             orbits = orbits_of(problem, gait)
-            found.append(Climb(gait, orbits, score(problem, gait, orbits)))
+            found.append(Continuation(gait, orbits, score(problem, gait, orbits)))
     except KeyboardInterrupt:
         return found, True
     return found, False
@@ -277,13 +284,13 @@ class _Climbing:
     starts: int
     say: Say
 
-    def __call__(self, rungs: tuple[Rung, ...], pieces: Sequence[tuple[int, Gait]]) -> list[dict[str, Any]]:
-        """Take each gait up the rungs; return records of where it came and by which steps."""
-        return [self._one(rungs, k, gait) for k, gait in pieces]
+    def __call__(self, stages: tuple[Stage, ...], pieces: Sequence[tuple[int, Gait]]) -> list[dict[str, Any]]:
+        """Take each gait up the stages; return records of where it came and by which steps."""
+        return [self._one(stages, k, gait) for k, gait in pieces]
 
-    def _one(self, rungs: tuple[Rung, ...], start: int, gait: Gait) -> dict[str, Any]:
+    def _one(self, stages: tuple[Stage, ...], start: int, gait: Gait) -> dict[str, Any]:
         try:
-            found = climb(self.problem, gait, rungs, _reporter(self.say, start, self.starts))
+            found = run_stages(self.problem, gait, stages, _reporter(self.say, start, self.starts))
         except NoAnswerError as error:
             self.say(f"start {start + 1} of {self.starts}: {error}")
             return {"gait": None, "steps": []}
@@ -291,13 +298,13 @@ class _Climbing:
 
 
 def _all(
-    climbing: _Climbing, gaits: list[tuple[int, Gait]], rungs: tuple[Rung, ...], where: Where
-) -> tuple[dict[int, Climb], bool]:
+    climbing: _Climbing, gaits: list[tuple[int, Gait]], stages: tuple[Stage, ...], where: Where
+) -> tuple[dict[int, Continuation], bool]:
     """Return the climbs of all starts that lead somewhere, and whether Ctrl-C ended them early."""
     problem = climbing.problem
-    kept = None if where.resume is None else Resume(where.resume, f"gait_opt {problem} {rungs}")
-    work = partial(climbing, rungs)
-    climbs: dict[int, Climb] = {}
+    kept = None if where.resume is None else Resume(where.resume, f"gait_opt {problem} {stages}")
+    work = partial(climbing, stages)
+    climbs: dict[int, Continuation] = {}
     try:
         with executor(where.jobs, where.cluster) as several:
             for (k, _), record in zip(gaits, sweep(work, gaits, chunk=1, where=several, resume=kept)):
@@ -305,13 +312,13 @@ def _all(
                     gait = Gait.of_record(record["gait"])
                     orbits = orbits_of(problem, gait)
                     steps = tuple(Step.of_record(step) for step in record["steps"])
-                    climbs[k] = Climb(gait, orbits, score(problem, gait, orbits), steps)
+                    climbs[k] = Continuation(gait, orbits, score(problem, gait, orbits), steps)
     except KeyboardInterrupt:
         return climbs, True
     return climbs, False
 
 
-def _distinct(climbs: dict[int, Climb]) -> list[int]:
+def _distinct(climbs: dict[int, Continuation]) -> list[int]:
     """Return the starts, best first, without those that came to the same optimum as a better one."""
     kept: list[int] = []
     for k in sorted(climbs, key=lambda k: -climbs[k].score.total):
@@ -325,9 +332,9 @@ def _reporter(say: Say, start: int, starts: int) -> Callable[[Step, Score], None
     who = f"start {start + 1} of {starts}" if start < starts else f"population {start - starts + 1}"
 
     def report(step: Step, best: Score) -> None:
-        rung = step.rung
+        stage = step.stage
         say(
-            f"{who}: friction smoothed at {rung.friction_speed_m_s:g} m/s, "
+            f"{who}: friction smoothed at {stage.friction_speed_m_s:g} m/s, "
             f"{step.elements} elements, {step.iterations} iterations: "
             f"{step.speed_m_s:.4f} m/s by collocation, "
             f"{step.simulated_m_s:.4f} simulated; best {best.total:.4f}{step.trouble}"

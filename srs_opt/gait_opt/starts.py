@@ -12,9 +12,9 @@ import numpy as np
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait, Wave, published_wave
 from srs_opt.gait_opt.collocation.problem import CycleProblem
+from srs_opt.gait_opt.continuation import orbits_of
 from srs_opt.gait_opt.corrections import steered
 from srs_opt.gait_opt.goal import Goal
-from srs_opt.gait_opt.ladder import orbits_of
 from srs_opt.gait_opt.score import score
 from srs_opt.orbit.steady import steady_gait
 

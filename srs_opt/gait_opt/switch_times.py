@@ -15,7 +15,7 @@ from srs_opt.gait_opt.collocation.phases import Cuts, exchanged, phase_cuts, pha
 from srs_opt.gait_opt.collocation.problem import CycleProblem
 from srs_opt.gait_opt.collocation.program import Program
 from srs_opt.gait_opt.collocation.refine import defects, refined_cuts
-from srs_opt.gait_opt.ladder import Report, Rung, Step, bounded, elements_until, orbits_of
+from srs_opt.gait_opt.continuation import Report, Stage, Step, bounded, elements_until, orbits_of
 from srs_opt.gait_opt.prices import Price, prices
 from srs_opt.gait_opt.score import Score, score
 from srs_opt.orbit.motion import STRAIGHT_RADIUS_M
@@ -181,7 +181,7 @@ def _solve(
     speeds = _path_speeds(problem, p, solution.z, scales, mesh)
     defect = defects(p, solution, parameters, mesh)
     step = Step(
-        Rung(own, mesh.elements, reach), speeds[0], speeds[0], solution.iterations,
+        Stage(own, mesh.elements, reach), speeds[0], speeds[0], solution.iterations,
         explained(p, solution, trial), mesh.elements, float(defect.max()),
     )  # fmt: skip
     finer = cuts

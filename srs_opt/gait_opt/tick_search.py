@@ -11,9 +11,9 @@ import numpy as np
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait
 from srs_opt.gait_opt.collocation.problem import CycleProblem
+from srs_opt.gait_opt.continuation import orbits_of
 from srs_opt.gait_opt.corrections import symmetrized
 from srs_opt.gait_opt.goal import tick_counts
-from srs_opt.gait_opt.ladder import orbits_of
 from srs_opt.gait_opt.score import score
 
 # Periods about the optimum's, in ticks: half miss the even period beside an odd one, double find no more

@@ -212,17 +212,17 @@ def smoothed(robot_run: Integrator, friction_speed_m_s: float) -> Integrator:
     )
 
 
-def climb(
+def run_stages(
     run: Integrator, task: Task, plan: ValvePlan, ladder: tuple[float, ...], most: int = 60
 ) -> Candidate:
     """Return the optimum that a ladder of friction smoothing speeds leads to, the robot's own last."""
     best: Candidate | None = None
     for speed in (*ladder, 0.0):
-        rung = Solver(smoothed(run, speed), task)
-        found = rung.solve(plan, most)
+        stage = Solver(smoothed(run, speed), task)
+        found = stage.solve(plan, most)
         plan = found.plan
         if speed == 0.0:
             best = found
     if best is None:
-        raise NoAnswerError("no rung")
+        raise NoAnswerError("no stage")
     return best

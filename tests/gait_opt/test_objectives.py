@@ -15,9 +15,9 @@ from srs_opt.gait_opt.collocation.guess import gait_from, unknowns_from_orbits
 from srs_opt.gait_opt.collocation.layout import Mesh
 from srs_opt.gait_opt.collocation.problem import CycleProblem
 from srs_opt.gait_opt.collocation.solver import Solver
+from srs_opt.gait_opt.continuation import Stage, orbits_of, solve_from
 from srs_opt.gait_opt.corrections import on_ticks
 from srs_opt.gait_opt.goal import Goal, Limits
-from srs_opt.gait_opt.ladder import Rung, orbits_of, solve_from
 from srs_opt.gait_opt.objectives.objective import Objective
 from srs_opt.gait_opt.objectives.registry import built_in, objective_named, register_objective
 from srs_opt.gait_opt.optimize import optimize_gait
@@ -125,18 +125,18 @@ def test_formulas_that_are_none_are_refused(merit, word):
 
 @pytest.fixture(scope="module")
 def optimum():
-    """Case, gait, rung, solution and program of an optimum at smoothed friction."""
+    """Case, gait, stage, solution and program of an optimum at smoothed friction."""
     case = replace(problem(Goal()), limits=Limits(pressure_kpa=(41.0, 43.0)))
-    rung = Rung(0.03, 24, 0.3, 1)
+    stage = Stage(0.03, 24, 0.3, 1)
     start = published_wave(ROBOT, 2.0, 41.0).gait()
     for _ in range(3):
-        solution, p, _ = solve_from(case, start, orbits_of(case, start, 0.03), rung, 0.3)
+        solution, p, _ = solve_from(case, start, orbits_of(case, start, 0.03), stage, 0.3)
         start = gait_from(p.layout, solution.z)
-    return case, start, rung, solution, p
+    return case, start, stage, solution, p
 
 
 def test_prices_of_limits_are_what_a_step_brings(optimum):
-    case, gait, rung, solution, p = optimum
+    case, gait, stage, solution, p = optimum
     orbits = orbits_of(case, gait, 0.03)
     worth = score(case, gait, orbits).scale
     told = {price.limit: price for price in prices(case, p, solution, worth)}
@@ -145,22 +145,22 @@ def test_prices_of_limits_are_what_a_step_brings(optimum):
         ("the highest pressure", Limits(pressure_kpa=(41.0, 43.2)), 0.2),
         ("the highest frequency", Limits((1.0, 2.02), (41.0, 43.0)), 0.2),
     ):
-        again, q, _ = solve_from(replace(case, limits=changed), gait, orbits, rung, 0.3)
+        again, q, _ = solve_from(replace(case, limits=changed), gait, orbits, stage, 0.3)
         gained = worth * (again.z[q.layout.merit] - solution.z[p.layout.merit])
         assert gained == pytest.approx(share * told[limit].merit, rel=0.1)
 
 
 def test_other_solvers_take_the_same_program(optimum):
-    case, gait, rung, *_ = optimum
+    case, gait, stage, *_ = optimum
     orbits = orbits_of(case, gait, 0.03)
     short = Solver("sqpmethod", (("max_iter", 2),))
-    other, _, _ = solve_from(replace(case, solver=short), gait, orbits, rung, 0.3)
+    other, _, _ = solve_from(replace(case, solver=short), gait, orbits, stage, 0.3)
     assert not other.converged
     assert np.isfinite(other.z).all()
     one = Solver.of_words("ipopt", ["max_iter=1"])
-    assert solve_from(replace(case, solver=one), gait, orbits, rung, 0.3)[0].iterations == 1
+    assert solve_from(replace(case, solver=one), gait, orbits, stage, 0.3)[0].iterations == 1
     with pytest.raises(InputError, match="solver ipopt with options fly=1"):
-        solve_from(replace(case, solver=Solver.of_words("ipopt", ["fly=1"])), gait, orbits, rung, 0.3)
+        solve_from(replace(case, solver=Solver.of_words("ipopt", ["fly=1"])), gait, orbits, stage, 0.3)
     with pytest.raises(InputError, match="KEY=VALUE"):
         Solver.of_words("ipopt", ["fly"])
     with pytest.raises(InputError, match="solver must be"):
@@ -169,7 +169,9 @@ def test_other_solvers_take_the_same_program(optimum):
 
 def test_an_objective_of_ones_own_is_optimized(monkeypatch):
     """Least pressure at a least speed: the constraint is active in the simulated motion."""
-    monkeypatch.setattr(search_module, "ladder", lambda own_m_s, **how: (Rung(0.03, 28, 0.1, 2),))
+    monkeypatch.setattr(
+        search_module, "continuation_stages", lambda own_m_s, **how: (Stage(0.03, 28, 0.1, 2),)
+    )
 
     def gentle(cycle):
         return -cycle.pressure_kpa / 50

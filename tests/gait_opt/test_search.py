@@ -17,6 +17,7 @@ from srs_opt.gait_opt import search as search_module
 from srs_opt.gait_opt.__main__ import main
 from srs_opt.gait_opt.certificate import certify, periodicity_gap, self_clearance_m
 from srs_opt.gait_opt.collocation.problem import CycleProblem
+from srs_opt.gait_opt.continuation import Stage, orbits_of, run_stages
 from srs_opt.gait_opt.corrections import (
     duty_biased,
     end_for_end,
@@ -27,7 +28,6 @@ from srs_opt.gait_opt.corrections import (
     within,
 )
 from srs_opt.gait_opt.goal import Goal, Limits, air_work_j, chamber_volume_m3
-from srs_opt.gait_opt.ladder import Rung, climb, orbits_of
 from srs_opt.gait_opt.population import evolved
 from srs_opt.gait_opt.reach import refuse_contradictions
 from srs_opt.gait_opt.report import summary, wave_parameters
@@ -176,8 +176,8 @@ def test_interrupted_search_keeps_the_best():
 
 @pytest.mark.slow
 def test_starts_give_the_same_bits_wherever_they_run_and_go_on(monkeypatch, tmp_path):
-    rungs = Rung(0.03, 30, 0.1, 1), Rung(0.004, 50, 0.05, 1)
-    monkeypatch.setattr(search_module, "ladder", lambda own_m_s, **how: rungs)
+    stages = Stage(0.03, 30, 0.1, 1), Stage(0.004, 50, 0.05, 1)
+    monkeypatch.setattr(search_module, "continuation_stages", lambda own_m_s, **how: stages)
 
     def as_it_is(problem, gait, reach, report=None):
         """Leave out what follows the starts: one computation, in this process always."""
@@ -212,7 +212,7 @@ def test_an_interrupt_inside_the_solver_is_not_lost():
 
     def work():
         for k in range(20):  # the first round compiles
-            climb(problem, start, (Rung(0.03, 40, 0.1, 4),))
+            run_stages(problem, start, (Stage(0.03, 40, 0.1, 4),))
             if k == 0:
                 timer.start()
 

@@ -12,8 +12,8 @@ from srs_opt.gait_opt import from_rest, polish
 from srs_opt.gait_opt.collocation.guess import unknowns_from_orbits
 from srs_opt.gait_opt.collocation.layout import Mesh
 from srs_opt.gait_opt.collocation.problem import CycleProblem
+from srs_opt.gait_opt.continuation import Stage, Step, orbits_of, run_stages
 from srs_opt.gait_opt.goal import Goal, Limits
-from srs_opt.gait_opt.ladder import Rung, Step, climb, orbits_of
 from srs_opt.gait_opt.robust import of_stiffness, relative, stiffness_interval
 from srs_opt.gait_opt.score import score
 from srs_opt.gait_opt.softness import robust_gait
@@ -56,9 +56,9 @@ def test_collocated_bends_converge_to_the_simulated_orbit():
 def test_optimum_of_a_soft_body_from_the_published_gait():
     """The best that a population search of another program knows at 0.005 N m^2 is 0.519 m/s."""
     start = published_wave(SOFT, 2.0, 48.0).gait()
-    rungs = (*(Rung(v, n, 0.1, 4, quick=True) for v, n in ((0.1, 24), (0.03, 28), (0.01, 36))),
-             Rung(0.004, 50, 0.05, 1, quick=True))  # fmt: skip
-    found = climb(problem(SOFT), start, rungs)
+    stages = (*(Stage(v, n, 0.1, 4, quick=True) for v, n in ((0.1, 24), (0.03, 28), (0.01, 36))),
+             Stage(0.004, 50, 0.05, 1, quick=True))  # fmt: skip
+    found = run_stages(problem(SOFT), start, stages)
     assert found.score.total > 0.97 * 0.519
     lags = np.diff([on for ((on, _),) in found.gait.intervals]) / found.gait.period_s % 1.0
     tail, _, head = -2 * np.pi * (lags - 1)
@@ -117,7 +117,7 @@ def test_search_from_rest_gains_on_ticks_inside_the_limits(monkeypatch):
 
 
 def test_orbits_that_rest_does_not_reach_are_noticed():
-    step = Step(Rung(0.002, 80, 0.1), 0.5, 0.5, 10, astray=0.01)
+    step = Step(Stage(0.002, 80, 0.1), 0.5, 0.5, 10, astray=0.01)
     assert not from_rest.misled([step])
     assert from_rest.misled([step, replace(step, astray=0.2)])
 

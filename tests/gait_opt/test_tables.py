@@ -15,9 +15,9 @@ from srs_opt.errors import InputError
 from srs_opt.gait import Wave
 from srs_opt.gait_opt import family
 from srs_opt.gait_opt.catalogue import default_table, shipped_table
+from srs_opt.gait_opt.continuation import Stage
 from srs_opt.gait_opt.export import write_csv
 from srs_opt.gait_opt.family import build_table
-from srs_opt.gait_opt.ladder import Rung
 from srs_opt.gait_opt.table import GaitTable, load_table, save_table
 from srs_opt.gait_opt.ticks import LEFT_BIT, RIGHT_BIT, Schedule
 from srs_opt.gait_opt.wishes import Wish, generations, wishes
@@ -187,7 +187,7 @@ def short_table(monkeypatch):
     """Make tables of three coarse gaits."""
     asked = (Wish("a", None, None, None), Wish("b", None, 0.08, "a"), Wish("c R0.784", 0.784, None, "a"))
     monkeypatch.setattr(family, "wishes", lambda robot: asked)
-    monkeypatch.setattr(family, "ladder", lambda own_m_s: (Rung(0.03, 30, 0.1, 1),))
+    monkeypatch.setattr(family, "continuation_stages", lambda own_m_s: (Stage(0.03, 30, 0.1, 1),))
 
 
 @pytest.mark.slow

@@ -5,8 +5,8 @@ import pytest
 
 from srs_opt.gait import Wave
 from srs_opt.gait_opt.collocation.problem import CycleProblem
+from srs_opt.gait_opt.continuation import Stage, run_stages
 from srs_opt.gait_opt.goal import Goal, Limits
-from srs_opt.gait_opt.ladder import Rung, climb
 from srs_opt.gait_opt.report import wave_parameters
 from srs_opt.gait_opt.switch_times import optimize_switch_times
 from srs_opt.robot import wpi_srs
@@ -42,7 +42,7 @@ def test_small_viscous_waves_have_the_lag_of_theory(start_deg):
     limits = Limits((1.0, 1.0), (PRESSURE_KPA, PRESSURE_KPA))
     problem = CycleProblem((robot,), "complex", Goal(), limits)
     start = Wave.uniform(4, 1.0, PRESSURE_KPA, np.radians(start_deg)).gait()
-    near = climb(problem, start, (Rung(robot.friction_speed_m_s, 60, 0.1, 6),)).gait
+    near = run_stages(problem, start, (Stage(robot.friction_speed_m_s, 60, 0.1, 6),)).gait
     found = optimize_switch_times(problem, near, 0.05)
     assert np.degrees(np.abs(found.orbits[0].kappa * robot.segment_length_m).max()) < 3
     known = wave_parameters(found.gait)

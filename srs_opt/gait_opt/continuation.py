@@ -1,9 +1,9 @@
-"""From a starting gait to an optimal one: a ladder of friction smoothing speeds, each rung by collocation.
+"""From a starting gait to an optimal one: a ladder of friction smoothing speeds, each stage by collocation.
 
 Friction that nearly sticks makes the problem stiff and its landscape rugged; smoothed friction does not.
-Every rung starts from the *simulated* orbit of the gait so far (primal feasible whatever the mesh) and may
-move the gait by a limited reach; a rung whose limits bind is repeated. What counts at the end is the
-gait simulated with the robot's own friction, the best that any rung led to, never the collocation's own
+Every stage starts from the *simulated* orbit of the gait so far (primal feasible whatever the mesh) and may
+move the gait by a limited reach; a stage whose limits bind is repeated. What counts at the end is the
+gait simulated with the robot's own friction, the best that any stage led to, never the collocation's own
 number.
 """
 
@@ -42,10 +42,10 @@ _STATE_LIMIT = 4.0  # scaled states stay below
 
 
 @dataclass(frozen=True)
-class Rung:
-    """One rung: smoothing speed (m/s), elements of the mesh, reach of the switches (cycles), repeats.
+class Stage:
+    """One stage: smoothing speed (m/s), elements of the mesh, reach of the switches (cycles), repeats.
 
-    A `quick` rung solves to a rough tolerance and gives up early.
+    A `quick` stage solves to a rough tolerance and gives up early.
     """
 
     friction_speed_m_s: float
@@ -61,9 +61,9 @@ class Step:
 
     Attributes
     ----------
-    rung : Rung
+    stage : Stage
     speed_m_s, simulated_m_s : float
-        By collocation and by simulation at the rung's smoothing speed.
+        By collocation and by simulation at the stage's smoothing speed.
     iterations : int
     trouble : str
     astray : float
@@ -71,7 +71,7 @@ class Step:
         another orbit than the one collocated.
     """
 
-    rung: Rung
+    stage: Stage
     speed_m_s: float
     simulated_m_s: float
     iterations: int
@@ -83,7 +83,7 @@ class Step:
     @staticmethod
     def of_record(record: dict[str, Any]) -> Step:
         """Return the step that ``dataclasses.asdict`` made a record of."""
-        return Step(**{**record, "rung": Rung(**record["rung"])})
+        return Step(**{**record, "stage": Stage(**record["stage"])})
 
     @property
     def relative_error(self) -> float:
@@ -92,7 +92,7 @@ class Step:
 
 
 @dataclass(frozen=True)
-class Climb:
+class Continuation:
     """The result of a ladder: the gait, its orbits at the robots' own friction, the steps taken."""
 
     gait: Gait
@@ -110,30 +110,30 @@ Bounds = tuple[np.ndarray, np.ndarray]
 Report = Callable[[Step, Score], None]
 
 
-def ladder(own_m_s: float, reach: float = 0.1, *, quick: bool = False) -> tuple[Rung, ...]:
-    """Return the rungs from strongly smoothed friction to the robot's own `own_m_s`."""
+def continuation_stages(own_m_s: float, reach: float = 0.1, *, quick: bool = False) -> tuple[Stage, ...]:
+    """Return the stages from strongly smoothed friction to the robot's own `own_m_s`."""
     if quick:
-        return _quick_ladder(own_m_s, reach)
-    rungs = [Rung(v, n, reach, 4) for v, n in ((0.1, 40), (0.03, 40), (0.01, 50)) if v > 1.5 * own_m_s]
-    rungs += [Rung(0.004, 64, reach / 2, 2)] if own_m_s < 0.003 else []
-    rungs += [Rung(v, 80, reach / 3, 2) for v in (0.002, 0.001, 0.0005) if v > 1.5 * own_m_s]
-    return (*rungs, Rung(own_m_s, 80, reach / 3, 3))
+        return _quick_stages(own_m_s, reach)
+    stages = [Stage(v, n, reach, 4) for v, n in ((0.1, 40), (0.03, 40), (0.01, 50)) if v > 1.5 * own_m_s]
+    stages += [Stage(0.004, 64, reach / 2, 2)] if own_m_s < 0.003 else []
+    stages += [Stage(v, 80, reach / 3, 2) for v in (0.002, 0.001, 0.0005) if v > 1.5 * own_m_s]
+    return (*stages, Stage(own_m_s, 80, reach / 3, 3))
 
 
-def _quick_ladder(own_m_s: float, reach: float) -> tuple[Rung, ...]:
-    """Return rungs on coarse meshes, down to twice the robot's own smoothing or to that itself.
+def _quick_stages(own_m_s: float, reach: float) -> tuple[Stage, ...]:
+    """Return stages on coarse meshes, down to twice the robot's own smoothing or to that itself.
 
     From there the exact switch times are the better next step: they need a fine mesh only once.
     """
     speeds = [v for v in (0.1, 0.03, 0.01, 0.004, 0.002, 0.001) if v > 1.5 * own_m_s]
     if not speeds or speeds[-1] > 2 * own_m_s:
         speeds.append(own_m_s)
-    rungs = []
+    stages = []
     for v in speeds:
         elements = next((n for least, n in _QUICK_ELEMENTS if v >= least), _FINEST_QUICK)
         stiff = v < 0.01
-        rungs.append(Rung(v, elements, reach / 2 if stiff else reach, 2 if stiff else 4, quick=True))
-    return tuple(rungs)
+        stages.append(Stage(v, elements, reach / 2 if stiff else reach, 2 if stiff else 4, quick=True))
+    return tuple(stages)
 
 
 def orbits_of(problem: CycleProblem, gait: Gait, friction_speed_m_s: float = 0.0) -> tuple[Orbit, ...]:
@@ -149,8 +149,10 @@ def _orbit(robot: Robot, gait: Gait, model: str) -> Orbit:
     return steady_gait(robot, gait, model)
 
 
-def climb(problem: CycleProblem, gait: Gait, rungs: tuple[Rung, ...], report: Report | None = None) -> Climb:
-    """Return the gait that the rungs lead to, from `gait`.
+def run_stages(
+    problem: CycleProblem, gait: Gait, stages: tuple[Stage, ...], report: Report | None = None
+) -> Continuation:
+    """Return the gait that the stages lead to, from `gait`.
 
     Raises
     ------
@@ -158,9 +160,9 @@ def climb(problem: CycleProblem, gait: Gait, rungs: tuple[Rung, ...], report: Re
         If the starting gait itself has no steady state.
     """
     steps: list[Step] = []
-    best: Climb | None = None
-    for rung in rungs:
-        gait, taken = _rung(problem, gait, rung, report)
+    best: Continuation | None = None
+    for stage in stages:
+        gait, taken = _rung(problem, gait, stage, report)
         steps += taken
         with suppress(NoAnswerError):
             found = _judged(problem, gait)
@@ -168,22 +170,22 @@ def climb(problem: CycleProblem, gait: Gait, rungs: tuple[Rung, ...], report: Re
     return replace(best or _judged(problem, gait), steps=tuple(steps))
 
 
-def _judged(problem: CycleProblem, gait: Gait) -> Climb:
+def _judged(problem: CycleProblem, gait: Gait) -> Continuation:
     """Return the gait with its orbits and score at the robots' own friction, no steps taken."""
     orbits = orbits_of(problem, gait)
-    return Climb(gait, orbits, score(problem, gait, orbits))
+    return Continuation(gait, orbits, score(problem, gait, orbits))
 
 
-def _rung(problem: CycleProblem, gait: Gait, rung: Rung, report: Report | None) -> tuple[Gait, list[Step]]:
+def _rung(problem: CycleProblem, gait: Gait, stage: Stage, report: Report | None) -> tuple[Gait, list[Step]]:
     steps = []
-    orbits = orbits_of(problem, gait, rung.friction_speed_m_s)
+    orbits = orbits_of(problem, gait, stage.friction_speed_m_s)
     best = score(problem, gait, orbits)
-    reach = rung.reach
-    for _ in range(rung.repeats):
-        solution, p, binding = solve_from(problem, gait, orbits, rung, reach)
+    reach = stage.reach
+    for _ in range(stage.repeats):
+        solution, p, binding = solve_from(problem, gait, orbits, stage, reach)
         trial = gait_from(p.layout, solution.z)
         try:
-            trial_orbits = orbits_of(problem, trial, rung.friction_speed_m_s)
+            trial_orbits = orbits_of(problem, trial, stage.friction_speed_m_s)
         except NoAnswerError:
             reach /= 3
             continue
@@ -192,7 +194,7 @@ def _rung(problem: CycleProblem, gait: Gait, rung: Rung, report: Report | None) 
         trouble = explained(p, solution, trial)
         steps.append(
             Step(
-                rung, speed, trial_orbits[0].speed_m_s, solution.iterations, trouble, p.layout.elements,
+                stage, speed, trial_orbits[0].speed_m_s, solution.iterations, trouble, p.layout.elements,
                 astray=_astray(p, solution, trial_orbits),
             )
         )  # fmt: skip
@@ -241,19 +243,19 @@ def solve_from(
     problem: CycleProblem,
     gait: Gait,
     orbits: tuple[Orbit, ...],
-    rung: Rung,
+    stage: Stage,
     reach: float,
     mesh: Mesh | None = None,
 ) -> tuple[Solution, Program, bool]:
     """Solve one program from simulated orbits; also tell whether the reach was binding."""
-    mesh = mesh or mesh_for(orbits, rung.elements)
+    mesh = mesh or mesh_for(orbits, stage.elements)
     p = problem.program(mesh.elements)
     z, scales = unknowns_from_orbits(p.layout, list(problem.robots), list(orbits), mesh)
     worth = score(problem, gait, orbits)
-    parameters = problem.parameters(p, mesh, scales, rung.friction_speed_m_s, worth.scale)
+    parameters = problem.parameters(p, mesh, scales, stage.friction_speed_m_s, worth.scale)
     z[p.layout.merit] = worth.merit / worth.scale
     unknowns, rows, binding = bounded(problem, p, z, reach)
-    options = _QUICK if rung.quick else _ROAMING if problem.goal.turn == "side" else _PATIENT
+    options = _QUICK if stage.quick else _ROAMING if problem.goal.turn == "side" else _PATIENT
     solution = p.solve(z, parameters, unknowns, rows, options=options, solver=problem.solver)
     return solution, p, binding(solution.z)
 
