@@ -20,7 +20,7 @@ from srs_opt.gait_opt.polish import quantized
 from srs_opt.gait_opt.score import score
 from srs_opt.gait_opt.starts import best_start, plain_waves
 from srs_opt.gait_opt.table import GaitTable, TableGait
-from srs_opt.gait_opt.wishes import Wish, generations, wishes
+from srs_opt.gait_opt.table_spec import TableSpec, generations, table_specs
 from srs_opt.orbit.steady import Orbit, steady_gait
 from srs_opt.parallel import executor
 from srs_opt.parallel.sweep import Resume, sweep
@@ -42,9 +42,9 @@ class Work:
 
 @dataclass(frozen=True)
 class Task:
-    """One optimization: the wish and the gait to start from."""
+    """One optimization: the spec and the gait to start from."""
 
-    wish: Wish
+    spec: TableSpec
     start: Gait
 
 
@@ -69,24 +69,24 @@ def build_table(
     Raises
     ------
     NoAnswerError
-        If no wish is within reach.
+        If no spec is within reach.
     """
     work = Work(robot, model, limits or Limits(pressure_kpa=TABLE_PRESSURE_KPA))
     kept = None if resume is None else Resume(resume, f"gait table {work}")
     frequency, pressure = work.limits.frequency_hz[1], work.limits.pressure_kpa[1]
     starts: dict[str | None, Gait] = {None: published_wave(robot, frequency, pressure).gait()}
     entries: dict[str, list[TableGait]] = {}
-    asked = wishes(robot)
+    asked = table_specs(robot)
     for group in generations(asked):
-        tasks = [Task(wish, starts[wish.after]) for wish in group]
+        tasks = [Task(spec, starts[spec.after]) for spec in group]
         with executor(jobs, cluster) as where:
             results = sweep(partial(_fulfilled, work), tasks, chunk=1, where=where, resume=kept)
             for task, result in zip(tasks, results):
                 say(result["line"])
-                entries[task.wish.name] = [TableGait.of_record(g) for g in result["gaits"]]
+                entries[task.spec.name] = [TableGait.of_record(g) for g in result["gaits"]]
                 gait = result["next"]
-                starts[task.wish.name] = task.start if gait is None else Gait.of_record(gait)
-    gaits = tuple(entry for wish in asked for entry in entries[wish.name])
+                starts[task.spec.name] = task.start if gait is None else Gait.of_record(gait)
+    gaits = tuple(entry for spec in asked for entry in entries[spec.name])
     if not gaits:
         raise NoAnswerError(f"no gait of the table is within reach of robot '{robot.name}'")
     table = GaitTable(robot.name, robot.fingerprint(), model, gaits)
@@ -115,35 +115,35 @@ def _fulfilled(work: Work, tasks: Sequence[Task]) -> list[dict[str, Any]]:
 
 
 def _fulfil(work: Work, task: Task) -> dict[str, Any]:
-    wish = task.wish
-    objective = "speed" if wish.radius_m is None else "turn"
-    goal = Goal(objective, radius_m=wish.radius_m, envelope_m=wish.band_m)
-    problem = CycleProblem((wish.laden(work.robot),), work.model, goal, work.limits)
+    spec = task.spec
+    objective = "speed" if spec.radius_m is None else "turn"
+    goal = Goal(objective, radius_m=spec.radius_m, envelope_m=spec.band_m)
+    problem = CycleProblem((spec.laden(work.robot),), work.model, goal, work.limits)
     try:
         found = _solve(problem, task)
         gait = quantized(problem, found.gait)
-        gaits = images(work.robot, work.model, wish.name, gait, work.limits.tick_s)
+        gaits = images(work.robot, work.model, spec.name, gait, work.limits.tick_s)
     except NoAnswerError as error:
-        return {"gaits": [], "next": None, "line": f"{wish.name}: left out, {error}"}
+        return {"gaits": [], "next": None, "line": f"{spec.name}: left out, {error}"}
     entry = gaits[0]
     radius = "straight" if entry.radius_m is None else f"radius {entry.radius_m:.3f} m"
-    line = f"{wish.name}: {entry.speed_m_s:.3f} m/s, {radius}, band {sum(entry.envelope_m):.4f} m"
-    if not _kept(wish, entry):
+    line = f"{spec.name}: {entry.speed_m_s:.3f} m/s, {radius}, band {sum(entry.envelope_m):.4f} m"
+    if not _kept(spec, entry):
         return {"gaits": [], "next": None, "line": f"{line}: left out, not what was asked for"}
     return {"gaits": [g.record() for g in gaits], "next": found.gait.record(), "line": line}
 
 
-def _kept(wish: Wish, entry: TableGait) -> bool:
+def _kept(spec: TableSpec, entry: TableGait) -> bool:
     """Whether a gait is what was wished for, near enough."""
     if entry.speed_m_s < LEAST_SPEED_M_S:
         return False
-    if wish.load:  # asked for under load: without, it is what it is
-        return (wish.radius_m is None) == (abs(entry.turn_rate_rad_s) < STRAIGHT_RAD_S)
-    if wish.band_m is not None and sum(entry.envelope_m) > wish.band_m * (1 + _BAND_EXCESS):
+    if spec.load:  # asked for under load: without, it is what it is
+        return (spec.radius_m is None) == (abs(entry.turn_rate_rad_s) < STRAIGHT_RAD_S)
+    if spec.band_m is not None and sum(entry.envelope_m) > spec.band_m * (1 + _BAND_EXCESS):
         return False
-    if wish.radius_m is None:
+    if spec.radius_m is None:
         return entry.radius_m is None or abs(entry.turn_rate_rad_s) < STRAIGHT_RAD_S
-    return entry.radius_m is not None and abs(entry.radius_m / wish.radius_m - 1) < _RADIUS_ERROR
+    return entry.radius_m is not None and abs(entry.radius_m / spec.radius_m - 1) < _RADIUS_ERROR
 
 
 def _solve(problem: CycleProblem, task: Task) -> Continuation:
@@ -152,19 +152,19 @@ def _solve(problem: CycleProblem, task: Task) -> Continuation:
     A band makes starts hard to compare before they are optimized: then the best of either kind is.
     """
     neighbour, waves = [task.start], plain_waves(problem)
-    band = task.wish.band_m
+    band = task.spec.band_m
     kinds = [neighbour + waves] if band is None else [neighbour, waves]
-    found = [_continued(problem, best_start(problem, gaits), task.wish) for gaits in kinds]
+    found = [_continued(problem, best_start(problem, gaits), task.spec) for gaits in kinds]
     return max(found, key=lambda climb: climb.score.total)
 
 
-def _continued(problem: CycleProblem, start: Gait, wish: Wish) -> Continuation:
+def _continued(problem: CycleProblem, start: Gait, spec: TableSpec) -> Continuation:
     own = problem.robots[0].friction_speed_m_s
-    if wish.after is None:
+    if spec.after is None:
         return run_stages(problem, start, continuation_stages(own))
     last = Stage(own, 70, 0.03, 2)
     found = run_stages(problem, start, (Stage(max(own, 0.004), 60, 0.06, 3), last))
-    band = wish.band_m
+    band = spec.band_m
     if band is not None and (excess := sum(found.orbits[0].envelope_m) - band) > _BAND_EXCESS * band:
         # the mesh sees the body's reach at some instants only: ask for less by as much as it missed
         less = replace(problem, goal=replace(problem.goal, envelope_m=band - excess))

@@ -19,8 +19,8 @@ from srs_opt.gait_opt.continuation import Stage
 from srs_opt.gait_opt.export import write_csv
 from srs_opt.gait_opt.family import build_table
 from srs_opt.gait_opt.table import GaitTable, load_table, save_table
+from srs_opt.gait_opt.table_spec import TableSpec, generations, table_specs
 from srs_opt.gait_opt.ticks import LEFT_BIT, RIGHT_BIT, Schedule
-from srs_opt.gait_opt.wishes import Wish, generations, wishes
 from srs_opt.orbit.steady import steady_gait
 from srs_opt.robot import wpi_srs
 
@@ -105,7 +105,7 @@ def test_table_of_another_robot_is_refused(table, tmp_path):
 
 
 def test_every_wish_starts_from_one_of_an_earlier_generation():
-    asked = wishes(ROBOT)
+    asked = table_specs(ROBOT)
     assert len({w.name for w in asked}) == len(asked)
     done = {None}
     for group in generations(asked):
@@ -185,8 +185,12 @@ def test_nearest_gait(table):
 @pytest.fixture
 def short_table(monkeypatch):
     """Make tables of three coarse gaits."""
-    asked = (Wish("a", None, None, None), Wish("b", None, 0.08, "a"), Wish("c R0.784", 0.784, None, "a"))
-    monkeypatch.setattr(family, "wishes", lambda robot: asked)
+    asked = (
+        TableSpec("a", None, None, None),
+        TableSpec("b", None, 0.08, "a"),
+        TableSpec("c R0.784", 0.784, None, "a"),
+    )
+    monkeypatch.setattr(family, "table_specs", lambda robot: asked)
     monkeypatch.setattr(family, "continuation_stages", lambda own_m_s: (Stage(0.03, 30, 0.1, 1),))
 
 
@@ -202,7 +206,7 @@ def test_an_interrupted_table_goes_on_and_has_the_same_bits(short_table, monkeyp
         build_table(ROBOT, say=interrupt, jobs=1, resume=tmp_path / "kept")
     fulfil, asked = family._fulfil, []
     monkeypatch.setattr(
-        family, "_fulfil", lambda work, task: asked.append(task.wish.name) or fulfil(work, task)
+        family, "_fulfil", lambda work, task: asked.append(task.spec.name) or fulfil(work, task)
     )
     resumed = build_table(ROBOT, jobs=1, resume=tmp_path / "kept")
     assert asked == ["c R0.784"]

@@ -19,7 +19,7 @@ RUSH_TURN_BANDS: tuple[tuple[float, ...], ...] = ((), (), (), ())
 
 
 @dataclass(frozen=True)
-class Wish:
+class TableSpec:
     """One entry to optimize.
 
     Attributes
@@ -28,7 +28,7 @@ class Wish:
     radius_m, band_m : float or None
         Wanted radius (None: straight) and widest band (None: any).
     after : str or None
-        Name of the wish whose gait this one starts from; None: the first of all.
+        Name of the spec whose gait this one starts from; None: the first of all.
     load : float
         Share by which the rolling friction is larger, for which the gait is optimized. Its radius and band
         are asked for under that load; without it they come out a little different.
@@ -47,24 +47,24 @@ class Wish:
         return replace(robot, friction_tangential=(1 + self.load) * robot.friction_tangential)
 
 
-def wishes(robot: Robot) -> tuple[Wish, ...]:
+def table_specs(robot: Robot) -> tuple[TableSpec, ...]:
     """Return what a table holds, forward and to the left; the other three quadrants are images.
 
     Fast gaits go from the straight one to the tightest turn; at every radius, bands go from the fast gait's
     to the slimmest. (A slim gait hardly leads to a slim one at another radius: its on-intervals are
     another matter altogether.) Strong gaits and those that rush off from rest do the same under their loads.
     """
-    fast = _fan(robot, Wish("fast", None, None, None), STRAIGHT_BANDS, TURN_BANDS)
-    strong = Wish("strong", None, None, "fast", STRONG_LOAD)
-    rush = Wish("rush", None, None, "strong", RUSH_LOAD)
+    fast = _fan(robot, TableSpec("fast", None, None, None), STRAIGHT_BANDS, TURN_BANDS)
+    strong = TableSpec("strong", None, None, "fast", STRONG_LOAD)
+    rush = TableSpec("rush", None, None, "strong", RUSH_LOAD)
     laden = _fan(robot, strong, STRONG_BANDS, STRONG_TURN_BANDS) + _fan(robot, rush, (), RUSH_TURN_BANDS)
     return fast + laden
 
 
 def _fan(
-    robot: Robot, first: Wish, straight: tuple[float, ...], turns: tuple[tuple[float, ...], ...]
-) -> tuple[Wish, ...]:
-    """Return the first wish, its narrower companions, and the same at every radius."""
+    robot: Robot, first: TableSpec, straight: tuple[float, ...], turns: tuple[tuple[float, ...], ...]
+) -> tuple[TableSpec, ...]:
+    """Return the first spec, its narrower companions, and the same at every radius."""
     spine = robot.segments * robot.pitch_m
     found = [first, *_narrower(robot, first, straight)]
     wider = first
@@ -75,7 +75,7 @@ def _fan(
     return tuple(found)
 
 
-def _narrower(robot: Robot, widest: Wish, bands: tuple[float, ...]) -> list[Wish]:
+def _narrower(robot: Robot, widest: TableSpec, bands: tuple[float, ...]) -> list[TableSpec]:
     found = []
     kind = "strong" if widest.load else "slim"
     for share in bands:
@@ -86,12 +86,12 @@ def _narrower(robot: Robot, widest: Wish, bands: tuple[float, ...]) -> list[Wish
     return found
 
 
-def generations(asked: tuple[Wish, ...]) -> tuple[tuple[Wish, ...], ...]:
-    """Return the wishes in groups: each needs only gaits of the groups before."""
+def generations(asked: tuple[TableSpec, ...]) -> tuple[tuple[TableSpec, ...], ...]:
+    """Return the specs in groups: each needs only gaits of the groups before."""
     depth: dict[str | None, int] = {None: -1}
-    for wish in asked:
-        depth[wish.name] = depth[wish.after] + 1
-    groups: list[list[Wish]] = [[] for _ in range(max(depth.values()) + 1)]
-    for wish in asked:
-        groups[depth[wish.name]].append(wish)
+    for spec in asked:
+        depth[spec.name] = depth[spec.after] + 1
+    groups: list[list[TableSpec]] = [[] for _ in range(max(depth.values()) + 1)]
+    for spec in asked:
+        groups[depth[spec.name]].append(spec)
     return tuple(map(tuple, groups))
