@@ -111,7 +111,7 @@ def watched() -> Iterator[Watch]:
 
 
 def by_collocation(start: Gait, seed: int) -> None:
-    """Continuation the ladder from the start, then from others, as the command does."""
+    """Run the continuation from the start, then from others, as the command does."""
     run_stages(PROBLEM, start, continuation_stages(ROBOT.friction_speed_m_s, quick=True))
     for other in starting_gaits(PROBLEM, 8, seed + 100):
         run_stages(PROBLEM, other, continuation_stages(ROBOT.friction_speed_m_s, quick=True))

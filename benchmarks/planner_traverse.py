@@ -2,10 +2,10 @@
 
 python -m benchmarks.planner_traverse [--gaits FILE] [--width 16] [--mazes NAME ...]
 
-A family is one straight gait, duty-biased to either side, forward and backward: one pressure, one frequency, one
-lag. The same planner plans for the table and for each family. "Its own" family is that of the table's fastest
-straight gait; the others are uniform waves from a grid, of which "best" is the one that happens to be fastest
-in the maze at hand.
+A family is one straight gait, duty-biased to either side, forward and backward: one pressure, one frequency,
+one lag. The same planner plans for the table and for each family. "Its own" family is that of the table's
+fastest straight gait; the others are uniform waves from a grid, of which "best" is the one that happens to be
+fastest in the maze at hand.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""From a starting gait to an optimal one: a ladder of friction smoothing speeds, each stage by collocation.
+"""From a starting gait to an optimal one: continuation in the friction's smoothing, by collocation.
 
 Friction that nearly sticks makes the problem stiff and its landscape rugged; smoothed friction does not.
 Every stage starts from the *simulated* orbit of the gait so far (primal feasible whatever the mesh) and may
@@ -93,7 +93,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Continuation:
-    """The result of a ladder: the gait, its orbits at the robots' own friction, the steps taken."""
+    """The result of a continuation: the gait, its orbits at the robots' own friction, the steps taken."""
 
     gait: Gait
     orbits: tuple[Orbit, ...]
@@ -162,7 +162,7 @@ def run_stages(
     steps: list[Step] = []
     best: Continuation | None = None
     for stage in stages:
-        gait, taken = _rung(problem, gait, stage, report)
+        gait, taken = _run_stage(problem, gait, stage, report)
         steps += taken
         with suppress(NoAnswerError):
             found = _judged(problem, gait)
@@ -176,7 +176,9 @@ def _judged(problem: CycleProblem, gait: Gait) -> Continuation:
     return Continuation(gait, orbits, score(problem, gait, orbits))
 
 
-def _rung(problem: CycleProblem, gait: Gait, stage: Stage, report: Report | None) -> tuple[Gait, list[Step]]:
+def _run_stage(
+    problem: CycleProblem, gait: Gait, stage: Stage, report: Report | None
+) -> tuple[Gait, list[Step]]:
     steps = []
     orbits = orbits_of(problem, gait, stage.friction_speed_m_s)
     best = score(problem, gait, orbits)

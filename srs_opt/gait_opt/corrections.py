@@ -43,13 +43,13 @@ def steered(gait: Gait, miss: Callable[[Gait], float], tolerance: float, most: f
     """
     tried: dict[float, float] = {}
 
-    def at(lean: float) -> float:
-        if lean not in tried:
+    def at(bias: float) -> float:
+        if bias not in tried:
             try:
-                tried[lean] = miss(duty_biased(gait, lean))
+                tried[bias] = miss(duty_biased(gait, bias))
             except NoAnswerError:
-                tried[lean] = np.nan
-        return tried[lean]
+                tried[bias] = np.nan
+        return tried[bias]
 
     if abs(at(0.0)) <= tolerance:
         return gait

@@ -147,7 +147,7 @@ def _kept(spec: TableSpec, entry: TableGait) -> bool:
 
 
 def _solve(problem: CycleProblem, task: Task) -> Continuation:
-    """Return the best climb from the neighbour's gait and plain waves.
+    """Return the best continuation from the neighbour's gait and plain waves.
 
     A band makes starts hard to compare before they are optimized: then the best of either kind is.
     """
@@ -155,7 +155,7 @@ def _solve(problem: CycleProblem, task: Task) -> Continuation:
     band = task.spec.band_m
     kinds = [neighbour + waves] if band is None else [neighbour, waves]
     found = [_continued(problem, best_start(problem, gaits), task.spec) for gaits in kinds]
-    return max(found, key=lambda climb: climb.score.total)
+    return max(found, key=lambda c: c.score.total)
 
 
 def _continued(problem: CycleProblem, start: Gait, spec: TableSpec) -> Continuation:

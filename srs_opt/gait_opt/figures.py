@@ -19,7 +19,7 @@ _MM = 1e3
 
 @styled
 def convergence_figure(found: Found) -> Figure:
-    """Show how the winning start climbed the friction ladder, collocation beside simulation."""
+    """Show the winning start's continuation in the friction, collocation beside simulation."""
     figure, (top, bottom) = new_figure(2, 1, width_in=4.6, height_in=4.0, sharex=True)
     steps = found.steps
     number = np.arange(1, len(steps) + 1)

@@ -1,4 +1,4 @@
-"""The whole search: several starts up the ladder, the best ones to the top, then the finished gait."""
+"""The whole search: continuation from several starts, the best ones to the end, then the gait on ticks."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from srs_opt.gait_opt.population import populations
 from srs_opt.gait_opt.prices import Price
 from srs_opt.gait_opt.reach import refuse_contradictions
 from srs_opt.gait_opt.score import Score, score
-from srs_opt.gait_opt.starts import starting_gaits, steered
+from srs_opt.gait_opt.starts import starting_gaits, turned
 from srs_opt.orbit.steady import Orbit
 from srs_opt.parallel import executor
 from srs_opt.parallel.sweep import Resume, sweep
@@ -51,7 +51,7 @@ _MOVED = Stage(0.01, 36, 0.1, 2, quick=True)  # friction that forgives, for resu
 
 @dataclass(frozen=True)
 class Where:
-    """What takes the starts up the ladder: processes here or a cluster; and where finished ones are kept."""
+    """What runs the starts' continuations: processes here or a cluster; and where finished ones are kept."""
 
     jobs: int = 1
     cluster: str | None = None
@@ -84,7 +84,7 @@ class Found(Result):
     prices : tuple of Price
         What the limits that are active at the optimum cost.
     from_rest : FromRest, optional
-        The search by simulation from rest that followed the climbs, where collocation was misled.
+        The search by simulation from rest that followed the continuations, where collocation was misled.
     """
 
     gait: Gait
@@ -139,10 +139,10 @@ def search(
     starts : int
         The published gait, then quasi-random waves.
     warm : Gait, optional
-        The result of an earlier search: start from it alone, at the top of the ladder. Only where that
+        The result of an earlier search: start from it alone, at the last stages. Only where that
         leads to no certified gait, the whole search follows.
     where : Where
-        What climbs the ladder; the result is the same.
+        What runs the continuations; the result is the same.
 
     Raises
     ------
@@ -168,27 +168,27 @@ def search(
         candidates, lower = [start], ()
         upper = () if near else (replace(_MOVED, friction_speed_m_s=max(own, _MOVED.friction_speed_m_s)),)
         reach = _NEAR_REACH if near else _MOVED_REACH
-    climbing = _Climbing(problem, len(candidates), say)
-    climbs, interrupted = _all(climbing, list(enumerate(candidates)), lower, where)
-    if not climbs:
+    continuing = _Continuing(problem, len(candidates), say)
+    continued, interrupted = _all(continuing, list(enumerate(candidates)), lower, where)
+    if not continued:
         if interrupted:
             raise KeyboardInterrupt
         raise NoAnswerError("no start leads to a steady gait inside the limits")
     if not interrupted:
-        chosen = _distinct(climbs)[:_CARRIED]
-        carried, interrupted = _all(climbing, [(k, climbs[k].gait) for k in chosen], upper, where)
+        chosen = _distinct(continued)[:_CARRIED]
+        carried, interrupted = _all(continuing, [(k, continued[k].gait) for k in chosen], upper, where)
         for k, top in carried.items():
-            climbs[k] = replace(top, steps=(*climbs[k].steps, *top.steps))
+            continued[k] = replace(top, steps=(*continued[k].steps, *top.steps))
     evolved: list[Continuation] = []
     whole = warm is None and problem.intervals == 1
-    astray = whole and misled([step for c in climbs.values() for step in c.steps])
-    if not interrupted and whole and (_rugged(problem) or (_scatter(climbs) and not astray)):
-        evolved, interrupted = _evolved(problem, climbs, starts, seed, say, where)
+    astray = whole and misled([step for c in continued.values() for step in c.steps])
+    if not interrupted and whole and (_rugged(problem) or (_scatter(continued) and not astray)):
+        evolved, interrupted = _evolved(problem, continued, starts, seed, say, where)
     if evolved and _rugged(problem):  # the starts were not searched
-        climbs = {}
-    climbs |= {len(candidates) + k: found for k, found in enumerate(evolved)}
-    best = max(climbs, key=lambda k: climbs[k].score.total)
-    reached = climbs[best].gait
+        continued = {}
+    continued |= {len(candidates) + k: found for k, found in enumerate(evolved)}
+    best = max(continued, key=lambda k: continued[k].score.total)
+    reached = continued[best].gait
     settled: FromRest | None = None
     if astray and not interrupted:
         say("collocated orbits are not those reached from rest: a search by simulation from rest")
@@ -202,10 +202,10 @@ def search(
         orbits[0].gait,
         orbits,
         certificate,
-        tuple(c.score.merit for c in climbs.values()),
+        tuple(c.score.merit for c in continued.values()),
         len(evolved),
-        (*climbs[best].steps, *exact.steps),
-        sum(c.iterations for c in climbs.values()) + sum(s.iterations for s in exact.steps),
+        (*continued[best].steps, *exact.steps),
+        sum(c.iterations for c in continued.values()) + sum(s.iterations for s in exact.steps),
         time.perf_counter() - begun,
         interrupted,
         exact.prices,
@@ -218,17 +218,17 @@ def _rugged(problem: CycleProblem) -> bool:
     return problem.goal.turn == "side" and problem.intervals == 1
 
 
-def _scatter(climbs: dict[int, Continuation]) -> bool:
+def _scatter(continued: dict[int, Continuation]) -> bool:
     """Whether several starts led somewhere and no second one confirms the best."""
-    totals = sorted((c.score.total for c in climbs.values()), reverse=True)
+    totals = sorted((c.score.total for c in continued.values()), reverse=True)
     return len(totals) > 1 and totals[0] - totals[1] > _SCATTER * abs(totals[0])
 
 
 def _evolved(
-    problem: CycleProblem, climbs: dict[int, Continuation], starts: int, seed: int, say: Say, where: Where
+    problem: CycleProblem, continued: dict[int, Continuation], starts: int, seed: int, say: Say, where: Where
 ) -> tuple[list[Continuation], bool]:
     """Return what populations of simulated gaits come to, and whether Ctrl-C ended them early."""
-    totals = [c.score.total for c in climbs.values()]
+    totals = [c.score.total for c in continued.values()]
     if _rugged(problem):
         say("this objective has many optima: populations of simulated gaits")
     else:
@@ -256,7 +256,7 @@ def _warmed(problem: CycleProblem, warm: Gait, say: Say) -> tuple[Gait, bool]:
     start = within(problem.limits, warm)
     if start == warm and score(problem, warm, orbits_of(problem, warm)).miss < _KEPT:
         return warm, True
-    return steered(problem, start), False
+    return turned(problem, start), False
 
 
 def _refuse_out_of_reach(
@@ -277,7 +277,7 @@ def _refuse_out_of_reach(
 
 
 @dataclass(frozen=True)
-class _Climbing:
+class _Continuing:
     """What all starts have in common."""
 
     problem: CycleProblem
@@ -298,13 +298,13 @@ class _Climbing:
 
 
 def _all(
-    climbing: _Climbing, gaits: list[tuple[int, Gait]], stages: tuple[Stage, ...], where: Where
+    continuing: _Continuing, gaits: list[tuple[int, Gait]], stages: tuple[Stage, ...], where: Where
 ) -> tuple[dict[int, Continuation], bool]:
-    """Return the climbs of all starts that lead somewhere, and whether Ctrl-C ended them early."""
-    problem = climbing.problem
+    """Return the continuations of all starts that lead somewhere, and whether Ctrl-C ended them early."""
+    problem = continuing.problem
     kept = None if where.resume is None else Resume(where.resume, f"gait_opt {problem} {stages}")
-    work = partial(climbing, stages)
-    climbs: dict[int, Continuation] = {}
+    work = partial(continuing, stages)
+    continued: dict[int, Continuation] = {}
     try:
         with executor(where.jobs, where.cluster) as several:
             for (k, _), record in zip(gaits, sweep(work, gaits, chunk=1, where=several, resume=kept)):
@@ -312,18 +312,18 @@ def _all(
                     gait = Gait.of_record(record["gait"])
                     orbits = orbits_of(problem, gait)
                     steps = tuple(Step.of_record(step) for step in record["steps"])
-                    climbs[k] = Continuation(gait, orbits, score(problem, gait, orbits), steps)
+                    continued[k] = Continuation(gait, orbits, score(problem, gait, orbits), steps)
     except KeyboardInterrupt:
-        return climbs, True
-    return climbs, False
+        return continued, True
+    return continued, False
 
 
-def _distinct(climbs: dict[int, Continuation]) -> list[int]:
+def _distinct(continued: dict[int, Continuation]) -> list[int]:
     """Return the starts, best first, without those that came to the same optimum as a better one."""
     kept: list[int] = []
-    for k in sorted(climbs, key=lambda k: -climbs[k].score.total):
-        mine = climbs[k].score
-        if all(abs(mine.total - climbs[j].score.total) > _ALIKE * mine.scale for j in kept):
+    for k in sorted(continued, key=lambda k: -continued[k].score.total):
+        mine = continued[k].score
+        if all(abs(mine.total - continued[j].score.total) > _ALIKE * mine.scale for j in kept):
             kept.append(k)
     return kept
 

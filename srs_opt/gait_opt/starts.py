@@ -44,10 +44,10 @@ def starting_gaits(problem: CycleProblem, count: int, seed: int) -> list[Gait]:
         lag = wholeturn / (segments + 1) * (0.7 + 0.9 * u[2])
         phases = lag * np.arange(1, segments + 1) + 0.4 * (u[3:] - 0.5)
         gaits.append(Wave(frequency, pressure, tuple(phases.tolist()), (0.0,) * segments).gait())
-    return [steered(problem, g) for g in gaits]
+    return [turned(problem, g) for g in gaits]
 
 
-def steered(problem: CycleProblem, gait: Gait) -> Gait:
+def turned(problem: CycleProblem, gait: Gait) -> Gait:
     """Return the gait duty-biased towards the wanted turn, as far as smoothed friction lets it."""
     goal = problem.goal
     robot = replace(problem.robots[0], friction_speed_m_s=_SMOOTHED_M_S)

@@ -83,7 +83,7 @@ def searched_on_ticks(problem: CycleProblem, gait: Gait, rounded: Gait) -> Gait:
     """
     search = _Search(problem, max(math.ceil(problem.limits.min_dwell_s / problem.limits.tick_s - 1e-6), 1))
     starts = {search.value(start): start for start in _starts(problem, gait, rounded)}
-    found = [search.climbed(starts[value], value) for value in sorted(starts, reverse=True)[:_SEARCHED]]
+    found = [search.improved(starts[value], value) for value in sorted(starts, reverse=True)[:_SEARCHED]]
     value, best = max(found, key=lambda each: each[0], default=(-math.inf, None))
     if best is None or value <= score(problem, rounded, orbits_of(problem, rounded)).total:
         return rounded
@@ -105,7 +105,7 @@ class _Search:
         except NoAnswerError:
             return -math.inf
 
-    def climbed(self, best: TickGait, value: float) -> tuple[float, TickGait]:
+    def improved(self, best: TickGait, value: float) -> tuple[float, TickGait]:
         """Return the score and gait from which no move gains; a move that gains is repeated."""
         pressure, trials, improved = self.problem.limits.pressure_kpa, 0, True
         tried = {best}

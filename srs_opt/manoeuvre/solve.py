@@ -213,16 +213,16 @@ def smoothed(robot_run: Integrator, friction_speed_m_s: float) -> Integrator:
 
 
 def run_stages(
-    run: Integrator, task: Task, plan: ValvePlan, ladder: tuple[float, ...], most: int = 60
+    run: Integrator, task: Task, plan: ValvePlan, speeds: tuple[float, ...], most: int = 60
 ) -> Candidate:
-    """Return the optimum that a ladder of friction smoothing speeds leads to, the robot's own last."""
+    """Return the optimum that continuation over friction smoothing speeds leads to, the robot's own last."""
     best: Candidate | None = None
-    for speed in (*ladder, 0.0):
-        stage = Solver(smoothed(run, speed), task)
-        found = stage.solve(plan, most)
+    for speed in (*speeds, 0.0):
+        solver = Solver(smoothed(run, speed), task)
+        found = solver.solve(plan, most)
         plan = found.plan
         if speed == 0.0:
             best = found
     if best is None:
-        raise NoAnswerError("no stage")
+        raise NoAnswerError("no smoothing speed led to a plan")
     return best

@@ -349,7 +349,7 @@ def test_a_population_finds_what_a_start_does_not():
     case = CycleProblem((quick,), "complex", Goal(), Limits())
     gait, total = evolved(case, published_wave(quick, 1.5, 48.0).gait(), 3, 300)
     assert steady_gait(quick, gait).speed_m_s == pytest.approx(total, abs=1e-3)
-    assert total > 0.25  # in 300 gaits; the ladder comes from there to 0.21 m/s
+    assert total > 0.25  # in 300 gaits; continuation comes from there to 0.21 m/s
 
 
 def test_unknown_objective():

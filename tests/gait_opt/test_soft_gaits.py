@@ -128,7 +128,7 @@ def test_what_was_given_is_kept_where_no_better_gait_has_a_steady_motion(monkeyp
     def lost(*arguments):
         raise NoAnswerError("the motion does not repeat with the gait's period")
 
-    monkeypatch.setattr(finish, "optimize_switch_times", lost)
+    monkeypatch.setattr(polish, "optimize_switch_times", lost)
     rigid = CycleProblem((wpi_srs(),), "complex", Goal("speed"), Limits())
     gait = published_wave(wpi_srs(), 2.0, 55.0).gait()
     exact, certificate, orbits = polish.polished(rigid, gait, 0.02)
