@@ -20,7 +20,7 @@ from benchmarks.stored import Row, gather, stored_rows, study_parser
 from planners.maze.maze import Maze
 from planners.maze.places import Goal, Pose
 from planners.motion.store import load_motion
-from planners.plan.portfolio import Wish, solve
+from planners.plan.portfolio import PlanRequest, solve
 from planners.search.problem import Problem
 from srs_opt.gait import Gait
 from srs_opt.gait_opt.catalogue import default_table
@@ -68,7 +68,7 @@ def task_named(name: str) -> Task:
 def rival_s(name: str) -> float | None:
     """Return the time of the best sequence of table gaits, None where the table has none."""
     if name == TASKS[0]:
-        plan = solve(problem(), Wish()).plan
+        plan = solve(problem(), PlanRequest()).plan
         return None if plan is None else plan.duration_s
     if name not in TASKS[1:3]:
         return None

@@ -61,7 +61,7 @@ def run(options: argparse.Namespace) -> Answer:
     from planners.pilot.session import pilot
     from planners.pilot.sources import open_source
     from planners.plan.inputs import gaits_from, problem_from, valve_limits
-    from planners.plan.portfolio import Wish, solve
+    from planners.plan.portfolio import PlanRequest, solve
     from srs_opt.controller.program import Program
 
     clock = MachineClock(options.slow_motion)
@@ -69,8 +69,8 @@ def run(options: argparse.Namespace) -> Answer:
     problem = problem_from(options)
     source = open_source(options.pose, problem.robot, clock, lambda message: say(options, message))
     try:
-        wish = Wish(options.planner, options.seed, options.time_limit, options.best)
-        result = solve(problem, wish, lambda message: say(options, message))
+        request = PlanRequest(options.planner, options.seed, options.time_limit, options.best)
+        result = solve(problem, request, lambda message: say(options, message))
         record = result.to_record(problem)
         if result.plan is None:
             return Answer(record, f"{result.status}: {result.reason}", False)

@@ -136,7 +136,7 @@ def run(options: argparse.Namespace) -> Answer:
 
     from planners.drive.engine_plant import drive_in_engine
     from planners.plan.inputs import problem_from
-    from planners.plan.portfolio import Wish, solve
+    from planners.plan.portfolio import PlanRequest, solve
     from planners.plan.registry import planner_named
     from planners.plan.route import Route, drive_plan
     from planners.refine.refine import check_refinable
@@ -156,8 +156,8 @@ def run(options: argparse.Namespace) -> Answer:
     problem = problem_from(options)
     if options.refine:
         check_refinable(problem)
-    wish = Wish(options.planner, options.seed, options.time_limit, options.best)
-    route = Route(problem, solve(problem, wish, lambda message: say(options, message)))
+    request = PlanRequest(options.planner, options.seed, options.time_limit, options.best)
+    route = Route(problem, solve(problem, request, lambda message: say(options, message)))
     if options.refine and route.solved:
         route = route.refined(lambda message: say(options, message))
     words = [route.in_words()]

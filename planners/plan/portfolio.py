@@ -33,7 +33,7 @@ WIDER = (50, 150, 500, 1500)  # beams that look for better plans
 
 
 @dataclass(frozen=True)
-class Wish:
+class PlanRequest:
     """What the user asked for.
 
     Attributes
@@ -55,7 +55,7 @@ class Wish:
 Tell = Callable[[str], None]
 
 
-def solve(problem: Problem, wish: Wish, tell: Tell = lambda message: None) -> PlanResult:
+def solve(problem: Problem, request: PlanRequest, tell: Tell = lambda message: None) -> PlanResult:
     """Return the answer of the wanted planner, or of the portfolio.
 
     Raises
@@ -64,22 +64,22 @@ def solve(problem: Problem, wish: Wish, tell: Tell = lambda message: None) -> Pl
         If there is no such planner.
     """
     began = time.perf_counter()
-    if wish.planner == "auto":
-        result = _rounds(problem, wish, tell)
+    if request.planner == "auto":
+        result = _rounds(problem, request, tell)
     else:
-        planner = planner_named(wish.planner)
+        planner = planner_named(request.planner)
         if planner.solver is not None:
-            result = planner.solver(problem, time_limit_s=wish.time_limit_s, tell=tell).run()
+            result = planner.solver(problem, time_limit_s=request.time_limit_s, tell=tell).run()
         else:
-            result = _alone(problem, wish, planner, tell)
-    if wish.best and result.plan is not None:
-        result = _better(problem, wish, result, tell)
+            result = _alone(problem, request, planner, tell)
+    if request.best and result.plan is not None:
+        result = _better(problem, request, result, tell)
     return replace(result, planning_s=time.perf_counter() - began)
 
 
-def _rounds(problem: Problem, wish: Wish, tell: Tell) -> PlanResult:
+def _rounds(problem: Problem, request: PlanRequest, tell: Tell) -> PlanResult:
     makers = [planner_named(name).solver for name in OURS]
-    ours = [make(problem, time_limit_s=wish.time_limit_s, tell=tell) for make in makers if make]
+    ours = [make(problem, time_limit_s=request.time_limit_s, tell=tell) for make in makers if make]
     began = time.perf_counter()
     for turn in range(ROUNDS):
         for solver in ours:
@@ -88,7 +88,7 @@ def _rounds(problem: Problem, wish: Wish, tell: Tell) -> PlanResult:
                 return result
         if all(solver.ended for solver in ours):
             return result
-        left = wish.time_limit_s - (time.perf_counter() - began)
+        left = request.time_limit_s - (time.perf_counter() - began)
         if left <= 0:
             return result
         if not has_ompl():
@@ -96,20 +96,20 @@ def _rounds(problem: Problem, wish: Wish, tell: Tell) -> PlanResult:
                 tell(f"{MISSING}: our own searches go on alone")
             continue
         tell(f"lattice: nothing among {ours[0].looked_at} cycles; OMPL's planners look too")
-        plan = _ompl_round(problem, wish, FIRST_ITERATIONS * 2**turn, left)
+        plan = _ompl_round(problem, request, FIRST_ITERATIONS * 2**turn, left)
         if plan is not None:
             return PlanResult("solved", plan, None, 0.0, result.effort)
     return result
 
 
-def _ompl_round(problem: Problem, wish: Wish, iterations: int, left_s: float) -> Plan | None:
+def _ompl_round(problem: Problem, request: PlanRequest, iterations: int, left_s: float) -> Plan | None:
     """Return the plan of the first planner in order that has a certified one."""
     deadline = time.perf_counter() + left_s
     with ExitStack() as processes:  # one each: a planner that crashes takes no other with it
         pools = [processes.enter_context(_worker()) for _ in OMPLS]
         with workers_deaf_to_interrupts():
             futures = [
-                pool.submit(found_apart, problem, name, iterations, wish.seed)
+                pool.submit(found_apart, problem, name, iterations, request.seed)
                 for pool, name in zip(pools, OMPLS)
             ]
         for name, future in zip(OMPLS, futures):
@@ -127,21 +127,21 @@ def _result(future: Future[tuple[int, ...] | None], left_s: float) -> tuple[int,
         return None
 
 
-def _alone(problem: Problem, wish: Wish, planner: Planner, tell: Tell) -> PlanResult:
+def _alone(problem: Problem, request: PlanRequest, planner: Planner, tell: Tell) -> PlanResult:
     """Return the answer of one planner, in rounds with fresh seeds."""
     began = time.perf_counter()
     for turn in range(ROUNDS):
-        left = wish.time_limit_s - (time.perf_counter() - began)
+        left = request.time_limit_s - (time.perf_counter() - began)
         if left <= 0:
             break
         iterations = FIRST_ITERATIONS * 2**turn
-        gaits = _found(problem, planner, iterations, wish.seed + turn, left)
+        gaits = _found(problem, planner, iterations, request.seed + turn, left)
         plan = _certified(problem, planner.name, gaits)
         if plan is not None:
             return PlanResult("solved", plan, None, 0.0, {"iterations": iterations})
         tell(f"{planner.name}: no certified plan in {iterations} iterations")
-    late = time.perf_counter() - began >= wish.time_limit_s
-    within = f"within the time limit of {wish.time_limit_s:g} s" if late else f"in {ROUNDS} rounds"
+    late = time.perf_counter() - began >= request.time_limit_s
+    within = f"within the time limit of {request.time_limit_s:g} s" if late else f"in {ROUNDS} rounds"
     reason = f"{planner.name} found no plan that passes the certificate {within}; other planners may"
     return PlanResult("timeout" if late else "not_found", None, reason, 0.0, {"rounds": turn + 1})
 
@@ -171,12 +171,12 @@ def _certified(problem: Problem, planner: str, gaits: tuple[int, ...] | None) ->
     return Plan(planner, gaits, certificate) if certificate.passed else None
 
 
-def _better(problem: Problem, wish: Wish, result: PlanResult, tell: Tell) -> PlanResult:
+def _better(problem: Problem, request: PlanRequest, result: PlanResult, tell: Tell) -> PlanResult:
     """Search with wider beams as long as there is time; keep the cheapest plan."""
     began = time.perf_counter()
     best = result
     for width in WIDER:
-        left = wish.time_limit_s - (time.perf_counter() - began)
+        left = request.time_limit_s - (time.perf_counter() - began)
         if left <= 0:
             break
         solver = LatticeSolver(problem, beams=(replace(BEAM, width=width),), time_limit_s=left, tell=tell)

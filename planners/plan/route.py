@@ -17,7 +17,7 @@ from planners.plan.explain import Explanation, explain
 from planners.plan.inputs import check_margin, gaits_for, placed_maze, planning_problem
 from planners.plan.looks import Looks, looks
 from planners.plan.options import MARGIN_M
-from planners.plan.portfolio import Wish, solve
+from planners.plan.portfolio import PlanRequest, solve
 from planners.refine.refine import Refinement, refine
 from planners.search.price import Price
 from planners.search.problem import Problem
@@ -174,7 +174,7 @@ def plan(
     margin_m, valves, drive, cost
         As in `planning_problem`.
     planner, seed, time_limit_s, best
-        As in `Wish`.
+        As in `PlanRequest`.
     say : callable, optional
         Gets lines of progress.
 
@@ -197,7 +197,7 @@ def plan(
     problem = planning_problem(
         robot, placed, table, margin_m=margin_m, valves=valves, drive=drive, cost=cost, tell=say
     )
-    return Route(problem, solve(problem, Wish(planner, seed, time_limit_s, best), say))
+    return Route(problem, solve(problem, PlanRequest(planner, seed, time_limit_s, best), say))
 
 
 def drive_plan(

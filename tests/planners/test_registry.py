@@ -7,7 +7,7 @@ import pytest
 from planner_rooms import corridor
 
 from planners.plan.certify import certify
-from planners.plan.portfolio import Wish, solve
+from planners.plan.portfolio import PlanRequest, solve
 from planners.plan.registry import OMPLS, OURS, Effort, planner_named, register_planner
 from planners.search.ompl_problem import cycle_setup, gaits_of
 from planners.search.ompl_setup import counted, seeded
@@ -57,7 +57,7 @@ def test_no_such_planner(name):
 
 def test_a_planner_of_ones_own(problem_in):
     problem = problem_in(corridor(0.5))
-    result = solve(problem, Wish("forward"))
+    result = solve(problem, PlanRequest("forward"))
     assert result.plan.planner == "forward" and set(result.plan.gaits) == {0}
     with pytest.raises(InputError, match="taken"):
         register_planner("forward", FORWARD.search)
@@ -69,7 +69,7 @@ def test_a_planner_of_ones_own(problem_in):
 
 def test_without_ompl(problem_in, without_ompl):
     problem = problem_in(corridor(0.5))
-    assert solve(problem, Wish()).plan.planner == "lattice"
+    assert solve(problem, PlanRequest()).plan.planner == "lattice"
     with pytest.raises(InputError, match="OMPL is not installed"):
         planner_named("rrt")
-    assert solve(problem, Wish("forward")).plan.planner == "forward"
+    assert solve(problem, PlanRequest("forward")).plan.planner == "forward"
