@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from planners.motion.table import SAMPLES
-from planners.search.ahead import motion_lines, remaining
 from planners.search.costmap import BLOCKED_S
+from planners.search.heuristic import cost_to_go, motion_lines
 from planners.search.problem import Cycle, Problem
 from planners.search.tree import Root, Step, Tree, arrival_index, at_rest, cell_of
 
@@ -124,7 +124,7 @@ class BeamSearch:
         problem, s, motion = self.problem, self.settings, self.problem.motion
         state, before = self._tree.cycle[node].state, self._tree.gait[node]
         move = motion.move(state[0], state[1], state[2], before, state[3])
-        left = remaining(problem, move.pose[:, -1], move.speed_m_s, s.by_heading)
+        left = cost_to_go(problem, move.pose[:, -1], move.speed_m_s, s.by_heading)
         order = np.argsort(left + motion.period_s, kind="stable")
         order = order[(left[order] < BLOCKED_S / 2) & motion.may_follow(before)[order]]
         offers: list[_Offer] = []

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planners.search.ahead import motion_lines, remaining
 from planners.search.costmap import BLOCKED_S
+from planners.search.heuristic import cost_to_go, motion_lines
 from planners.search.problem import Cycle, Problem
 from planners.search.tree import Root, Step, Tree, arrival_index, at_rest, cell_of
 
@@ -137,7 +137,7 @@ class LatticeSearch:
         # every other point and sample decides what is out of the question; the simulation decides the rest
         lines = motion_lines(problem, before, move.pose, self._gaits)
         room = problem.body.estimate(lines).min(axis=1)
-        left = remaining(problem, move.pose[:, -1], move.speed_m_s, s.by_heading)
+        left = cost_to_go(problem, move.pose[:, -1], move.speed_m_s, s.by_heading)
         possible = (room > problem.margin_m - problem.field.error_m) & (left < BLOCKED_S / 2)
         possible &= motion.may_follow(before)
         air = np.clip(1 - (room - problem.margin_m) / problem.motion.body_width_m, 0.0, 1.0)

@@ -4,7 +4,7 @@ import numpy as np
 from planner_rooms import maze_of
 
 from planners.plan.solve import BEAM, LatticeSolver
-from planners.search.ahead import MOST_GAIN, remaining
+from planners.search.heuristic import MOST_GAIN, cost_to_go
 
 THIN_M = 0.006
 
@@ -28,7 +28,7 @@ def test_a_head_across_a_wall_promises_little(problem_in):
     gaits = problem.motion.size
     ends = np.tile(here, (gaits, 1))
     ends[:, 2] -= problem.motion.course[:-1]
-    left = remaining(problem, ends, np.full(gaits, problem.tariff.top_speed_m_s))
+    left = cost_to_go(problem, ends, np.full(gaits, problem.tariff.top_speed_m_s))
     assert np.all(left > middle - gain)
 
 

@@ -14,7 +14,7 @@ MOST_GAIN = 5.0  # times the fastest gait's time for it, is the price of a way a
 OFF_THE_WAY_S = 1.0  # for a head in a place that leads nowhere
 
 
-def remaining(problem: Problem, end: Array, speed_m_s: Array, by_heading: bool = False) -> Array:
+def cost_to_go(problem: Problem, end: Array, speed_m_s: Array, by_heading: bool = False) -> Array:
     """Return the estimated price of what is left from the ends of a cycle of every gait.
 
     Parameters
