@@ -73,9 +73,9 @@ def section(rows: list[Row], when: str) -> Section:
     ]
     columns = ["maze", "as found (s)", "refined (s)", "less (%)", "processor s per s of plan",
                "least clearance (mm)", "driven"]  # fmt: skip
-    gained, price = 100 * float(np.median(less)), float(np.median(effort))
+    gained, cost = 100 * float(np.median(less)), float(np.median(effort))
     notes = [
-        f"{len(done)} of the {len(MAZES)} traverse mazes. Median {gained:.1f} % less time for {price:.1f} s "
+        f"{len(done)} of the {len(MAZES)} traverse mazes. Median {gained:.1f} % less time for {cost:.1f} s "
         f"of processor time per second of plan (most {max(effort):.1f}). {when}"
     ]
     return Section("Planner: plans refined", columns, cells, notes)

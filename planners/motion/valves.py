@@ -190,8 +190,8 @@ class Joints:
         else:
             ways = [(0.0, state, [0.0, *inner], -age_s)]
         found = [
-            (price + more, first, times)
-            for price, first, wanted, last in ways
+            (cost + more, first, times)
+            for cost, first, wanted, last in ways
             for more, times in self._kept(wanted, last, latest_s)
             if any(t > _SAME_S for t in times)  # a valve that never switches is no gait's
         ]
@@ -219,14 +219,14 @@ class Joints:
         switch = wanted[0]
         dwelt = self._later(last_s + self.limits.dwell_s) if math.isfinite(last_s) else -math.inf
         if switch >= dwelt - _SAME_S:
-            return [(price, [switch, *rest]) for price, rest in self._kept(wanted[1:], switch, latest_s)]
+            return [(cost, [switch, *rest]) for cost, rest in self._kept(wanted[1:], switch, latest_s)]
         ways = []
         if dwelt <= latest_s + _SAME_S:
             later = self._kept(wanted[1:], dwelt, latest_s)
-            ways += [(price + dwelt - switch, [dwelt, *rest]) for price, rest in later]
+            ways += [(cost + dwelt - switch, [dwelt, *rest]) for cost, rest in later]
         if len(wanted) > 1:
             left_out = self._kept(wanted[2:], last_s, latest_s)
-            ways += [(price + wanted[1] - switch, rest) for price, rest in left_out]
+            ways += [(cost + wanted[1] - switch, rest) for cost, rest in left_out]
         return ways
 
     def _later(self, time_s: float) -> float:

@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from planners.plan.certify import Certificate
-from planners.search.price import gait_air_j
+from planners.search.cost_model import gait_air_j
 from planners.search.problem import Problem
 
 Status = Literal["solved", "infeasible", "not_found", "timeout"]
@@ -44,17 +44,17 @@ class Plan:
         return float(np.hypot(*np.diff(self.certificate.pose[:, :2], axis=0).T).sum())
 
     def cost(self, problem: Problem) -> float:
-        """Return what the plan costs by the problem's price, in seconds of the fastest gait."""
+        """Return what the plan costs by the problem's cost, in seconds of the fastest gait."""
         c, gaits = self.certificate, np.array(self.gaits)
         within = [np.flatnonzero(c.cycle == k) for k in range(len(gaits))]
         poses = [c.pose[max(k[0] - 1, 0) : k[-1] + 1] for k in within if k.size]
         spares = [np.array([c.room_m[k].min() - problem.margin_m]) for k in within if k.size]
         whole = zip(gaits[:, None], poses, spares)
-        prices = [float(problem.tariff.of_cycles(g, pose[None], spare)[0]) for g, pose, spare in whole]
+        costs = [float(problem.cost_model.of_cycles(g, pose[None], spare)[0]) for g, pose, spare in whole]
         # of the last cycle only what was played until arrival counts
-        last = problem.motion.period_s[gaits[len(prices) - 1]]
-        left = float(problem.motion.period_s[gaits[: len(prices)]].sum()) - self.duration_s
-        return sum(prices) - prices[-1] * min(left / last, 1.0)
+        last = problem.motion.period_s[gaits[len(costs) - 1]]
+        left = float(problem.motion.period_s[gaits[: len(costs)]].sum()) - self.duration_s
+        return sum(costs) - costs[-1] * min(left / last, 1.0)
 
     def air_j(self, problem: Problem) -> float:
         """Return the energy of the air that the plan's cycles take."""
@@ -114,7 +114,7 @@ class PlanResult:
         record["error_bound_m"] = plan and math.ceil(1e7 * plan.certificate.error_m) / 1e7
         record["certified"] = bool(plan and plan.certificate.passed)
         record["margin_m"] = problem.margin_m
-        record["cost"] = problem.price
+        record["cost"] = problem.cost
         record["air_j"] = plan and round(plan.air_j(problem), 4)
         record["steps"] = plan.steps(problem) if plan else []
         record["path"] = plan.path() if plan else []

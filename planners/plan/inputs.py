@@ -16,7 +16,7 @@ from planners.motion.store import load_motion
 from planners.motion.transitions import Progress
 from planners.motion.valves import DEFAULT_LIMITS, ValveLimits, playable
 from planners.plan.options import MARGIN_M
-from planners.search.price import Price
+from planners.search.cost_model import Cost
 from planners.search.problem import Problem
 from srs_opt.command import chosen_model, progress, say
 from srs_opt.drive.calibration import NO_CALIBRATION, DriveCalibration, load_calibration
@@ -36,7 +36,7 @@ def planning_problem(
     margin_m: float = MARGIN_M,
     valves: ValveLimits = DEFAULT_LIMITS,
     drive: DriveCalibration | None = None,
-    cost: Price = "time",
+    cost: Cost = "time",
     tell: Tell = lambda message: None,
     show: Progress = iter,
 ) -> Problem:

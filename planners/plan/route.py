@@ -19,7 +19,7 @@ from planners.plan.looks import Looks, looks
 from planners.plan.options import MARGIN_M
 from planners.plan.portfolio import PlanRequest, solve
 from planners.refine.refine import Refinement, refine
-from planners.search.price import Price
+from planners.search.cost_model import Cost
 from planners.search.problem import Problem
 from srs_opt.drive.calibration import DriveCalibration
 from srs_opt.errors import NoAnswerError
@@ -153,7 +153,7 @@ def plan(
     margin_m: float = MARGIN_M,
     valves: ValveLimits = DEFAULT_LIMITS,
     drive: DriveCalibration | None = None,
-    cost: Price = "time",
+    cost: Cost = "time",
     planner: str = "auto",
     seed: int = 0,
     time_limit_s: float = 60.0,

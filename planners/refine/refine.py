@@ -90,8 +90,8 @@ def check_refinable(problem: Problem) -> None:
     """
     if not problem.bending.none:
         raise InputError("--refine optimizes the model's own motion: expected no --drive beside it")
-    if problem.price != "time":
-        raise InputError(f"--refine shortens the time: expected --cost time beside it, found {problem.price}")
+    if problem.cost != "time":
+        raise InputError(f"--refine shortens the time: expected --cost time beside it, found {problem.cost}")
     run = problem.run
     if not run.actuator.linear or _knows_frequency(run):
         raise InputError(

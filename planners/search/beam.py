@@ -38,9 +38,9 @@ class BeamSettings:
     cell, course_rad, speed : float
         Cells by which states are told apart: of two in a cell the cheaper goes on.
     change_s : float
-        Price of changing gait.
+        Cost of changing gait.
     air_s : float
-        Price of a cycle that just keeps the margin (none where a body width of air is left).
+        Cost of a cycle that just keeps the margin (none where a body width of air is left).
     slack : float
         Beyond the margin, for what happens between the samples of a cycle.
     by_heading : bool
@@ -59,7 +59,7 @@ class BeamSettings:
 
 
 class _Offer(NamedTuple):
-    """A cycle that may be begun: rank, parent and gait, price up to its end."""
+    """A cycle that may be begun: rank, parent and gait, cost up to its end."""
 
     rank: float
     parent: int
@@ -112,7 +112,7 @@ class BeamSearch:
         return self._tree.way_to(self._best[1])
 
     def _to_go_s(self, nodes: list[int]) -> float:
-        """Return the least price to the goal from the centres of mass of some nodes."""
+        """Return the least cost to the goal from the centres of mass of some nodes."""
         if not nodes:
             return math.inf
         places = np.array([self._tree.cycle[node].state[:2] for node in nodes])
@@ -134,7 +134,7 @@ class BeamSearch:
             spare = room - problem.margin_m
             fits = spare > -problem.field.error_m
             tight = np.clip(1 - spare / motion.body_width_m, 0.0, 1.0)
-            spent = self._tree.spent[node] + problem.tariff.of_cycles(gaits, move.pose[gaits], spare)
+            spent = self._tree.spent[node] + problem.cost_model.of_cycles(gaits, move.pose[gaits], spare)
             spent = spent + s.change_s * (gaits != before) + s.air_s * tight
             rank = spent + left[gaits]
             offers += [
@@ -183,7 +183,7 @@ class BeamSearch:
         if arrived is None:
             return node
         before = self._tree.spent[offer.parent]
-        price = before + (offer.spent - before) * arrived / SAMPLES
-        if self._best is None or price < self._best[0]:
-            self._best = price, node
+        cost = before + (offer.spent - before) * arrived / SAMPLES
+        if self._best is None or cost < self._best[0]:
+            self._best = cost, node
         return None

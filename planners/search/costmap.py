@@ -75,9 +75,9 @@ def cost_map(
     half_width_m: float,
     per_metre: Callable[[Array, Array], Array] = lambda in_time, room: in_time,
 ) -> CostMap:
-    """Return the time to `goal` for the centre of mass, or the price that `per_metre` makes of it.
+    """Return the time to `goal` for the centre of mass, or the cost that `per_metre` makes of it.
 
-    `per_metre` takes seconds per metre and distances to walls at places, and returns prices per metre.
+    `per_metre` takes seconds per metre and distances to walls at places, and returns costs per metre.
 
     Nodes nearer to a wall than half the body's width less the little by which the centre of mass of a bent
     body leaves its centre line are blocked.
@@ -118,7 +118,7 @@ def cost_map(
 
 
 def _graph(clear: NDArray[np.bool_], per_node: Array, spacing: float) -> Any:
-    """Return the clear steps (rows, columns, steps) as a sparse matrix of their prices.
+    """Return the clear steps (rows, columns, steps) as a sparse matrix of their costs.
 
     Its arrays are filled in place, row by row of the matrix: with lists of edges the memory of large maps
     would be three times as much.

@@ -185,8 +185,8 @@ def heading_map(
     count = len(place) * COURSES * 2
     if min(straight) > 0:
         forward = 2 * np.arange(count // 2)
-        price = np.full(forward.size, reversal_s)
-        edges += [(forward, forward + 1, price), (forward + 1, forward, price)]
+        cost = np.full(forward.size, reversal_s)
+        edges += [(forward, forward + 1, cost), (forward + 1, forward, cost)]
     begins, ends, costs = (np.concatenate(part) for part in zip(*edges))
     graph = coo_matrix((costs, (ends, begins)), shape=(count, count)).tocsr()  # backwards, from the goal
     sources = _sources(goal, nodes[free])

@@ -1,4 +1,4 @@
-"""What is still to come: the estimated price from where a cycle ends to the goal."""
+"""What is still to come: the estimated cost from where a cycle ends to the goal."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from planners.search.costmap import BLOCKED_S
 from planners.search.problem import Problem
 
 Array = NDArray[np.float64]
-MOST_GAIN = 5.0  # times the fastest gait's time for it, is the price of a way along the body
+MOST_GAIN = 5.0  # times the fastest gait's time for it, is the cost of a way along the body
 OFF_THE_WAY_S = 1.0  # for a head in a place that leads nowhere
 
 
 def cost_to_go(problem: Problem, end: Array, speed_m_s: Array, by_heading: bool = False) -> Array:
-    """Return the estimated price of what is left from the ends of a cycle of every gait.
+    """Return the estimated cost of what is left from the ends of a cycle of every gait.
 
     Parameters
     ----------
     problem : Problem
     end : array (gaits, 3)
-        Poses; the price is the mean of the ways from the middle, from half-way to the head and, twice, from
+        Poses; the cost is the mean of the ways from the middle, from half-way to the head and, twice, from
         the head: it is the first to know that a cycle turns the right way.
     speed_m_s : array (gaits,)
         Forward speeds there: speed is dear, it takes seconds to gather.
@@ -32,13 +32,13 @@ def cost_to_go(problem: Problem, end: Array, speed_m_s: Array, by_heading: bool 
         left, middle = _by_heading(problem, end)
     else:
         left, middle = _by_place(problem, end)
-    lack = np.clip(1 - np.abs(speed_m_s) / problem.tariff.top_speed_m_s, 0.0, 1.0)
-    left = left + problem.tariff.start_up * lack * np.minimum(left, 1.0)
+    lack = np.clip(1 - np.abs(speed_m_s) / problem.cost_model.top_speed_m_s, 0.0, 1.0)
+    left = left + problem.cost_model.start_up * lack * np.minimum(left, 1.0)
     return np.where(middle < BLOCKED_S, left, BLOCKED_S)
 
 
 def _by_heading(problem: Problem, end: Array) -> tuple[Array, Array]:
-    """Return the price of what is left, and whether there is a way at all (by place)."""
+    """Return the cost of what is left, and whether there is a way at all (by place)."""
     course = end[:, 2] + problem.motion.course[:-1]
     middle = problem.to_goal.at(end[:, :2])
     left = problem.to_goal_by_heading.at(end[:, :2], course, problem.motion.steady_speed_m_s < 0)
@@ -46,7 +46,7 @@ def _by_heading(problem: Problem, end: Array) -> tuple[Array, Array]:
 
 
 def _by_place(problem: Problem, end: Array) -> tuple[Array, Array]:
-    """Return the price of what is left, and whether there is a way at all."""
+    """Return the cost of what is left, and whether there is a way at all."""
     course = end[:, 2] + problem.motion.course[:-1]
     lever = problem.robot.length_m / 2
     along = lever * np.stack([np.cos(course), np.sin(course)], axis=1)
@@ -55,7 +55,7 @@ def _by_place(problem: Problem, end: Array) -> tuple[Array, Array]:
     head = np.where(head < BLOCKED_S, head, middle + OFF_THE_WAY_S)
     front = np.where(front < BLOCKED_S, front, middle + 0.5 * OFF_THE_WAY_S)
     # what is nearer to the goal by more than the way there takes lies behind a wall
-    gain = MOST_GAIN * lever / problem.tariff.top_speed_m_s
+    gain = MOST_GAIN * lever / problem.cost_model.top_speed_m_s
     head, front = np.maximum(head, middle - gain), np.maximum(front, middle - 0.5 * gain)
     return (middle + 2 * head + front) / 4, middle
 

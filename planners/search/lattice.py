@@ -34,9 +34,9 @@ class LatticeSettings:
     greed : float
         Weight of the remaining time against the time spent: 1 looks for fast plans, more finds one sooner.
     change_s : float
-        Price of changing gait.
+        Cost of changing gait.
     air_s : float
-        Price of a cycle that just keeps the margin (none where a body width of air is left).
+        Cost of a cycle that just keeps the margin (none where a body width of air is left).
     slack : float
         Beyond the margin, for what happens between the samples of a cycle.
     by_heading : bool
@@ -141,8 +141,8 @@ class LatticeSearch:
         possible = (room > problem.margin_m - problem.field.error_m) & (left < BLOCKED_S / 2)
         possible &= motion.may_follow(before)
         air = np.clip(1 - (room - problem.margin_m) / problem.motion.body_width_m, 0.0, 1.0)
-        price = problem.tariff.of_cycles(self._gaits, move.pose, room - problem.margin_m)
-        spent = self._tree.spent[node] + price
+        cost = problem.cost_model.of_cycles(self._gaits, move.pose, room - problem.margin_m)
+        spent = self._tree.spent[node] + cost
         spent = spent + s.change_s * (self._gaits != before) + s.air_s * air
         rank = spent + s.greed * left
         for gait in np.flatnonzero(possible):

@@ -1,9 +1,9 @@
 """The planning problem in OMPL's terms: one set-up that every planner is given.
 
 State: SE(2) and the number of a node of `Memory`, which holds what OMPL need not know (the state of the
-dynamic model, the gait before, the price so far). Control: the gait table, a gait's index as a floored real,
+dynamic model, the gait before, the cost so far). Control: the gait table, a gait's index as a floored real,
 held for 1 to `MOST_CYCLES` cycles. Propagator: cycles of the dynamic model. Validity: the swept body keeps
-the margin; a cycle that does not gets the number -1. Objective: the price of the problem (`--cost`).
+the margin; a cycle that does not gets the number -1. Objective: the cost of the problem (`--cost`).
 """
 
 from __future__ import annotations
@@ -72,8 +72,8 @@ class Memory:
         problem = self.problem
         spare = problem.body.estimate(cycle.lines).min(keepdims=True) - problem.margin_m
         index = np.array([gait])
-        price = float(problem.tariff.of_cycles(index, cycle.pose[None], spare)[0])
-        new = self.tree.add(number, gait, self.tree.spent[number] + price, cycle)
+        cost = float(problem.cost_model.of_cycles(index, cycle.pose[None], spare)[0])
+        new = self.tree.add(number, gait, self.tree.spent[number] + cost, cycle)
         if arrival_index(problem.goal, cycle.pose) is not None:
             self.arrived.add(new)
         return new

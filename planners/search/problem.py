@@ -18,9 +18,9 @@ from planners.motion.robots import undelayed
 from planners.motion.table import MotionTable, body_in_room
 from planners.motion.valves import Joints
 from planners.search.clearance import BodyClearance
+from planners.search.cost_model import Cost, CostModel
 from planners.search.costmap import CostMap, cost_map, slowness, speed_by_room
 from planners.search.heading_map import HeadingMap, heading_map
-from planners.search.price import Price, Tariff
 from srs_opt.drive.calibration import NO_CALIBRATION, DriveCalibration
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait_opt.table import GaitTable
@@ -71,7 +71,7 @@ class Problem:
     maze : Maze
         With start and goal.
     margin_m : float
-    price : {"time", "length", "clearance", "air"}
+    cost : {"time", "length", "clearance", "air"}
         What shall be small.
     drive : DriveCalibration
         Measured factors; `motion` is bent by them already (`MotionTable.bent`).
@@ -82,7 +82,7 @@ class Problem:
     motion: MotionTable
     maze: Maze
     margin_m: float
-    price: Price = "time"
+    cost: Cost = "time"
     drive: DriveCalibration = NO_CALIBRATION
 
     def __getstate__(self) -> dict[str, object]:
@@ -113,26 +113,26 @@ class Problem:
 
     @cached_property
     def to_goal(self) -> CostMap:
-        """Price of the way to the goal (time, where time counts)."""
+        """Cost of the way to the goal (time, where time counts)."""
         return cost_map(self.field, self.goal, self.gaits, self.robot.body_width_m / 2, self._per_metre)
 
     def _per_metre(self, in_time: Array, room: Array) -> Array:
-        return self.tariff.per_metre(in_time, room - self.robot.body_width_m / 2 - self.margin_m)
+        return self.cost_model.per_metre(in_time, room - self.robot.body_width_m / 2 - self.margin_m)
 
     @cached_property
     def to_goal_by_heading(self) -> HeadingMap:
-        """Price of the way to the goal by place, course and direction of travel."""
+        """Cost of the way to the goal by place, course and direction of travel."""
         half, start = self.robot.body_width_m / 2, self.start
         radius = 0.1 * self.robot.length_m
         from_start = cost_map(self.field, Goal(start.x, start.y, radius), self.gaits, half, self._per_metre)
         least = float(self.to_goal.at(np.array([start.x, start.y])))
-        detour = DETOUR_LENGTHS * self.robot.length_m / self.tariff.top_speed_m_s
+        detour = DETOUR_LENGTHS * self.robot.length_m / self.cost_model.top_speed_m_s
 
         def near_the_way(nodes: Array) -> NDArray[np.bool_]:
-            price = self.to_goal.at(nodes) + from_start.at(nodes)
-            return price < DETOUR_TIMES * least + detour
+            cost = self.to_goal.at(nodes) + from_start.at(nodes)
+            return cost < DETOUR_TIMES * least + detour
 
-        def price_per_metre(room: Array) -> Array:
+        def cost_per_metre(room: Array) -> Array:
             return self._per_metre(slowness(room, *speed_by_room(self.gaits)), room)
 
         return heading_map(
@@ -140,15 +140,15 @@ class Problem:
             self.goal,
             self.gaits,
             half + self.margin_m,
-            price_per_metre,
-            self.tariff.start_up,
+            cost_per_metre,
+            self.cost_model.start_up,
             near_the_way,
         )
 
     @cached_property
-    def tariff(self) -> Tariff:
-        """Prices of the gaits."""
-        return Tariff.of(self.price, self.robot, self.gaits)
+    def cost_model(self) -> CostModel:
+        """Costs of the gaits."""
+        return CostModel.of(self.cost, self.robot, self.gaits)
 
     @cached_property
     def start_slack_m(self) -> float:

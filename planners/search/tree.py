@@ -39,7 +39,7 @@ class Step(NamedTuple):
 
 @dataclass
 class Tree:
-    """What was simulated: every node's parent, gait, price up to there, and cycle."""
+    """What was simulated: every node's parent, gait, cost up to there, and cycle."""
 
     parent: list[int] = field(default_factory=list)
     gait: list[int] = field(default_factory=list)

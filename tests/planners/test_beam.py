@@ -23,12 +23,12 @@ def test_a_head_across_a_wall_promises_little(problem_in):
     here = np.array([0.8, 0.34, np.pi / 2])
     middle = float(problem.to_goal.at(here[:2]))
     head = float(problem.to_goal.at(here[:2] + [0.0, problem.robot.length_m / 2]))
-    gain = MOST_GAIN * problem.robot.length_m / 2 / problem.tariff.top_speed_m_s
+    gain = MOST_GAIN * problem.robot.length_m / 2 / problem.cost_model.top_speed_m_s
     assert head < middle - 1.5 * gain, "the head is across the wall, far on the way"
     gaits = problem.motion.size
     ends = np.tile(here, (gaits, 1))
     ends[:, 2] -= problem.motion.course[:-1]
-    left = cost_to_go(problem, ends, np.full(gaits, problem.tariff.top_speed_m_s))
+    left = cost_to_go(problem, ends, np.full(gaits, problem.cost_model.top_speed_m_s))
     assert np.all(left > middle - gain)
 
 

@@ -61,7 +61,7 @@ def test_heading_map_knows_that_turning_round_takes_a_way(problem_in):
     shortest = float(ahead.to_goal.at(here[0])[0])
     assert straight == pytest.approx(shortest, rel=0.15)
     radius = min(abs(e.radius_m) for e in ahead.gaits.gaits if e.radius_m)
-    assert turned > straight + 0.5 * math.pi * radius / ahead.tariff.top_speed_m_s
+    assert turned > straight + 0.5 * math.pi * radius / ahead.cost_model.top_speed_m_s
 
 
 def test_only_a_proof_is_called_infeasible(problem_in):

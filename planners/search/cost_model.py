@@ -1,6 +1,6 @@
 """What a plan costs: time, length, nearness to walls, or air; all counted in seconds of the fastest gait.
 
-The search adds up prices of cycles; the map of prices to the goal is made of prices per metre.
+The search adds up costs of cycles; the map of costs to the goal is made of costs per metre.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from srs_opt.gait_opt.table import GaitTable
 from srs_opt.robot import Robot
 
 Array = NDArray[np.float64]
-Price = Literal["time", "length", "clearance", "air"]
-PRICES: tuple[Price, ...] = get_args(Price)
-TIME_COUNTS = 0.3  # of a second per second where time is not the price: dawdling is never free
+Cost = Literal["time", "length", "clearance", "air"]
+COSTS: tuple[Cost, ...] = get_args(Price)
+TIME_COUNTS = 0.3  # of a second per second where time is not the cost: dawdling is never free
 NEAR_WIDTHS, NEAR_FACTOR = 2.0, 3.0  # within so many body widths of air, up to so much dearer
 DEARER = 1.3  # than the cheapest gait, straight and steady, is a metre of way as a rule
 START_UP_S = 0.6  # that a start from rest costs more than a flying one
@@ -27,37 +27,37 @@ SLOW = 0.1  # of the top speed; slower gaits say nothing of what a metre costs
 
 
 @dataclass(frozen=True, eq=False)
-class Tariff:
-    """Prices of the gaits of a table.
+class CostModel:
+    """Costs of the gaits of a table.
 
     Attributes
     ----------
-    price : Price
+    cost : Cost
     period_s, air_j, speed_m_s : array (gaits,)
         Of every gait: duration and compressed air of a cycle, mean speed.
     body_width_m : float
     """
 
-    price: Price
+    cost: Cost
     period_s: Array
     air_j: Array
     speed_m_s: Array
     body_width_m: float
 
     @staticmethod
-    def of(price: Price, robot: Robot, table: GaitTable) -> Tariff:
-        """Return the prices of a table's gaits."""
+    def of(cost: Cost, robot: Robot, table: GaitTable) -> CostModel:
+        """Return the costs of a table's gaits."""
         gaits = [entry.gait for entry in table.gaits]
         air = [gait_air_j(robot, gait) for gait in gaits]
         speed = [abs(entry.speed_m_s) for entry in table.gaits]
-        return Tariff(
-            price, np.array([g.period_s for g in gaits]), np.array(air), np.array(speed), robot.body_width_m
+        return CostModel(
+            cost, np.array([g.period_s for g in gaits]), np.array(air), np.array(speed), robot.body_width_m
         )
 
     @property
     def start_up(self) -> float:
         """Return what a start from rest costs more than a flying one; more of its air."""
-        return {"length": TIME_COUNTS, "air": 1.5}.get(self.price, START_UP_S)
+        return {"length": TIME_COUNTS, "air": 1.5}.get(self.cost, START_UP_S)
 
     @property
     def top_speed_m_s(self) -> float:
@@ -71,7 +71,7 @@ class Tariff:
         return float(self.air_j[fastest] / self.period_s[fastest])
 
     def of_cycles(self, gaits: NDArray[np.int64], pose: Array, spare_m: Array) -> Array:
-        """Return the prices (n,) of a cycle of some gaits.
+        """Return the costs (n,) of a cycle of some gaits.
 
         Parameters
         ----------
@@ -82,22 +82,22 @@ class Tariff:
             Clearance beyond the margin.
         """
         period = self.period_s[gaits]
-        if self.price == "time":
+        if self.cost == "time":
             return period
-        if self.price == "clearance":
+        if self.cost == "clearance":
             return period * self._nearness(spare_m)
-        if self.price == "length":
+        if self.cost == "length":
             way = np.hypot(*np.diff(pose[..., :2], axis=-2).transpose(2, 0, 1)).sum(axis=-1)
             return np.asarray(way / self.top_speed_m_s + TIME_COUNTS * period)
         return self.air_j[gaits] / self._air_w + TIME_COUNTS * period
 
     def per_metre(self, in_time: Array, spare_m: Array) -> Array:
-        """Return prices per metre where a metre takes `in_time` seconds and `spare_m` is beside the body."""
-        if self.price == "time":
+        """Return costs per metre where a metre takes `in_time` seconds and `spare_m` is beside the body."""
+        if self.cost == "time":
             return in_time
-        if self.price == "clearance":
+        if self.cost == "clearance":
             return in_time * self._nearness(spare_m)
-        if self.price == "length":
+        if self.cost == "length":
             return np.full(in_time.shape, 1 / self.top_speed_m_s) + TIME_COUNTS * in_time
         moving = self.speed_m_s > SLOW * self.top_speed_m_s
         least = (self.air_j[moving] / (self.speed_m_s[moving] * self.period_s[moving])).min()
