@@ -33,7 +33,7 @@ class BeamSettings:
     ----------
     width : int, optional
         States that go on; without, few on a long way and more on a short one.
-    brood : int
+    branching : int
         Of one state, so many at most.
     cell, course_rad, speed : float
         Cells by which states are told apart: of two in a cell the cheaper goes on.
@@ -48,7 +48,7 @@ class BeamSettings:
     """
 
     width: int | None = None
-    brood: int = 4
+    branching: int = 4
     cell: float = 0.127
     course_rad: float = math.radians(15)
     speed: float = 0.424
@@ -58,7 +58,7 @@ class BeamSettings:
     by_heading: bool = False
 
 
-class _Offer(NamedTuple):
+class _Expansion(NamedTuple):
     """A cycle that may be begun: rank, parent and gait, cost up to its end."""
 
     rank: float
@@ -100,8 +100,8 @@ class BeamSearch:
         """Drive the beam on over about `expansions` states; return the way to the goal when it has ended."""
         last = self.expanded + expansions
         while self._front and self.expanded < last:
-            offers = sorted(offer for node in self._front for offer in self._offers(node))
-            self._front = self._chosen(offers)
+            expansions = sorted(expansion for node in self._front for expansion in self._expansions(node))
+            self._front = self._chosen(expansions)
             nearest = self._to_go_s(self._front)
             self._stalled = 0 if nearest < self._nearest else self._stalled + 1
             self._nearest = min(nearest, self._nearest)
@@ -118,7 +118,7 @@ class BeamSearch:
         places = np.array([self._tree.cycle[node].state[:2] for node in nodes])
         return float(self.problem.to_goal.at(places).min())
 
-    def _offers(self, node: int) -> list[_Offer]:
+    def _expansions(self, node: int) -> list[_Expansion]:
         """Return the cycles that may follow a state, by the motion table."""
         self.expanded += 1
         problem, s, motion = self.problem, self.settings, self.problem.motion
@@ -127,7 +127,7 @@ class BeamSearch:
         left = cost_to_go(problem, move.pose[:, -1], move.speed_m_s, s.by_heading)
         order = np.argsort(left + motion.period_s, kind="stable")
         order = order[(left[order] < BLOCKED_S / 2) & motion.may_follow(before)[order]]
-        offers: list[_Offer] = []
+        expansions: list[_Expansion] = []
         for gaits in (order[:FIRST_LOOK], order[FIRST_LOOK:]):
             lines = motion_lines(problem, before, move.pose, gaits)
             room = problem.body.estimate(lines).min(axis=1, initial=math.inf)
@@ -137,19 +137,19 @@ class BeamSearch:
             spent = self._tree.spent[node] + problem.cost_model.of_cycles(gaits, move.pose[gaits], spare)
             spent = spent + s.change_s * (gaits != before) + s.air_s * tight
             rank = spent + left[gaits]
-            offers += [
-                _Offer(float(rank[k]), node, int(gaits[k]), float(spent[k])) for k in np.flatnonzero(fits)
+            expansions += [
+                _Expansion(float(rank[k]), node, int(gaits[k]), float(spent[k])) for k in np.flatnonzero(fits)
             ]
-            if len(offers) >= s.brood:
+            if len(expansions) >= s.branching:
                 break
-        return offers
+        return expansions
 
-    def _chosen(self, offers: list[_Offer]) -> list[int]:
-        """Simulate offers, best first, until the front is full again."""
+    def _chosen(self, expansions: list[_Expansion]) -> list[int]:
+        """Simulate expansions, best first, until the front is full again."""
         s, front = self.settings, []
-        brood: dict[int, int] = {}
-        for first in range(0, len(offers), TOGETHER):
-            batch = [o for o in offers[first : first + TOGETHER] if brood.get(o.parent, 0) < s.brood]
+        taken: dict[int, int] = {}
+        for first in range(0, len(expansions), TOGETHER):
+            batch = [o for o in expansions[first : first + TOGETHER] if taken.get(o.parent, 0) < s.branching]
             if self._best is not None:
                 batch = [o for o in batch if o.rank < self._best[0]]
                 if not batch:
@@ -158,32 +158,34 @@ class BeamSearch:
             tree = self._tree
             begins = [(tree.cycle[o.parent].state, tree.gait[o.parent], o.gait) for o in batch]
             cycles = self.problem.simulate_all(begins)
-            for offer, cycle in zip(batch, cycles):
-                node = None if cycle is None else self._taken(offer, cycle)
+            for expansion, cycle in zip(batch, cycles):
+                node = None if cycle is None else self._taken(expansion, cycle)
                 if node is not None:
-                    brood[offer.parent] = brood.get(offer.parent, 0) + 1
+                    taken[expansion.parent] = taken.get(expansion.parent, 0) + 1
                     front.append(node)
             if len(front) >= self._width:
                 break
         return front[: self._width]
 
-    def _taken(self, offer: _Offer, cycle: Cycle) -> int | None:
+    def _taken(self, expansion: _Expansion, cycle: Cycle) -> int | None:
         """Keep a simulated cycle if it is clear and the cheapest to come here; None too where it arrives."""
         s, state, length = self.settings, cycle.state, self.problem.robot.length_m
-        course = state[2] + self.problem.motion.course[offer.gait]
+        course = state[2] + self.problem.motion.course[expansion.gait]
         key = cell_of(state, course, s.cell * length, s.course_rad, s.speed * length)
-        if self._cheapest.get(key, math.inf) <= offer.spent:
+        if self._cheapest.get(key, math.inf) <= expansion.spent:
             return None
-        slack = self.root_slack_m if offer.parent == 0 else s.slack * length
-        if not self.problem.body.keeps_margin(cycle.lines, slack + (cycle.tube_m if offer.parent else 0.0)):
+        slack = self.root_slack_m if expansion.parent == 0 else s.slack * length
+        if not self.problem.body.keeps_margin(
+            cycle.lines, slack + (cycle.tube_m if expansion.parent else 0.0)
+        ):
             return None
-        self._cheapest[key] = offer.spent
-        node = self._tree.add(offer.parent, offer.gait, offer.spent, cycle)
+        self._cheapest[key] = expansion.spent
+        node = self._tree.add(expansion.parent, expansion.gait, expansion.spent, cycle)
         arrived = arrival_index(self.problem.goal, cycle.pose)
         if arrived is None:
             return node
-        before = self._tree.spent[offer.parent]
-        cost = before + (offer.spent - before) * arrived / SAMPLES
+        before = self._tree.spent[expansion.parent]
+        cost = before + (expansion.spent - before) * arrived / SAMPLES
         if self._best is None or cost < self._best[0]:
             self._best = cost, node
         return None
