@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planners.drive.contact import BodyWatch
-from planners.drive.foresight import Foresight
+from planners.drive.friction_ensemble import FrictionEnsemble
 from planners.drive.halt import halt
 from planners.drive.plant import Plant, PlantStopped, SimulatedPlant
 from planners.drive.track import Choice, Learned, Where, by_plan, choose, nearest_node, reference_of
@@ -119,7 +119,7 @@ class Drive:
     def __init__(self, problem: Problem, plan: Plan, plant: Plant, tell: Callable[[str], None]) -> None:
         self.problem, self.plant, self.tell = problem, plant, tell
         self.watch = BodyWatch(problem, plant.robot, plant.run)
-        self.foresight = Foresight(problem)
+        self.ensemble = FrictionEnsemble(problem)
         self.delay_s = valve_delay_s(plant.robot)
         self.state = plant.state
         self.before = problem.motion.rest
@@ -209,7 +209,7 @@ class Drive:
         """
         where = Where(self.state[:3].copy(), self.before, float(self.state[3]))
         planned = self._gait_by_plan(self.state)
-        enough_m = self.foresight.enough_m
+        enough_m = self.ensemble.enough_m
         if planned is not None and self._room_m(self.state, planned) > enough_m:
             if planned > self.problem.motion.rest:
                 return self._own_cycle(planned)
@@ -242,7 +242,7 @@ class Drive:
     def _room_m(self, state: Array, gait: int) -> float:
         """Return the least clearance over a cycle with any friction that the robot may have."""
         timeline = self.problem.joints.timeline(self.before, gait)
-        return self.foresight.least_room_m(state, timeline, 0.0, (self.before, gait))
+        return self.ensemble.least_room_m(state, timeline, 0.0, (self.before, gait))
 
     def _gait_by_plan(self, state: Array) -> int | None:
         """Return the gait that the plan plays next, if the robot is as the plan has it after a cycle."""
@@ -291,7 +291,7 @@ class Drive:
             return "contact"
         if arrived:
             return "arrived"
-        self.foresight.learn(before, cycle, self.state, (gait_before, index))
+        self.ensemble.learn(before, cycle, self.state, (gait_before, index))
         c, s = math.cos(begin[2]), math.sin(begin[2])
         dx, dy, turn = self.state[:3] - begin
         observed = np.array([c * dx + s * dy, c * dy - s * dx, turn])
@@ -316,7 +316,7 @@ class Drive:
         """Bring the robot to rest where there is room for it; return whether it came to no harm."""
         self.halts += 1
         try:
-            valves = halt(self.foresight, self.state, self.before)
+            valves = halt(self.ensemble, self.state, self.before)
             self.halted.append((self.watch.time_s, valves))
             trajectory = self.plant.play(valves, None)
         except PlantStopped as stopped:  # it vented by itself

@@ -13,7 +13,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from planners.drive.foresight import FADING, FRICTIONS
+from planners.drive.friction_ensemble import FADING, FRICTIONS
 from planners.drive.plant import PlantStopped
 from planners.motion.robots import undelayed, with_friction_times
 from planners.motion.table import body_in_room

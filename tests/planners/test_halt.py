@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from planner_rooms import maze_of
 
-from planners.drive.foresight import Foresight
+from planners.drive.friction_ensemble import FrictionEnsemble
 from planners.drive.halt import COAST_S, halt
 from srs_opt.simulate.timeline import Timeline
 
@@ -33,17 +33,17 @@ def test_vented_it_rolls_as_far_as_friction_lets_it(before_wall, robot):
     rolls_m = SPEED_M_S**2 / (2 * robot.friction_tangential * 9.81)
     left_m = 0.02
     problem, state = before_wall(rolls_m + left_m)
-    assert Foresight(problem).room_m(state, vented(problem)) == pytest.approx(left_m, abs=0.002)
+    assert FrictionEnsemble(problem).room_m(state, vented(problem)) == pytest.approx(left_m, abs=0.002)
 
 
 def test_vents_at_once_where_there_is_room(before_wall):
     problem, state = before_wall(0.5)
-    assert not halt(Foresight(problem), state, problem.motion.rest).valve.any()
+    assert not halt(FrictionEnsemble(problem), state, problem.motion.rest).valve.any()
 
 
 def test_brakes_where_venting_would_touch(before_wall):
     problem, state = before_wall(0.15)
-    assert Foresight(problem).room_m(state, vented(problem)) <= 0
-    chosen = halt(Foresight(problem), state, problem.motion.rest)
-    assert chosen.valve.any() and Foresight(problem).room_m(state, chosen) > 0
+    assert FrictionEnsemble(problem).room_m(state, vented(problem)) <= 0
+    chosen = halt(FrictionEnsemble(problem), state, problem.motion.rest)
+    assert chosen.valve.any() and FrictionEnsemble(problem).room_m(state, chosen) > 0
     assert not chosen.valve[:, -1].any() and np.isclose(chosen.duration_s[-1], COAST_S)

@@ -41,7 +41,7 @@ PLAUSIBLE, TIMES = 1.0, 3.0
 ENOUGH_MARGINS = 0.5  # of the margin: what leaves so much room is good enough
 
 
-class Foresight:
+class FrictionEnsemble:
     """Simulates what the driver thinks of doing, with every friction and stiffness that the robot may have.
 
     Parameters

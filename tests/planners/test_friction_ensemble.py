@@ -3,41 +3,41 @@
 import pytest
 from planner_rooms import corridor
 
-from planners.drive.foresight import FRICTIONS, Foresight
+from planners.drive.friction_ensemble import FRICTIONS, FrictionEnsemble
 from planners.motion.robots import undelayed, with_friction_times
 from srs_opt.simulate.integrate import Integrator
 from srs_opt.simulate.timeline import Timeline
 
 
 def driven(problem, true_robot, cycles=4):
-    """Return the foresight after some cycles of the fast gait on another robot, the cycle and the state."""
-    foresight = Foresight(problem)
+    """Return the ensemble after some cycles of the fast gait on another robot, the cycle and the state."""
+    ensemble = FrictionEnsemble(problem)
     run = Integrator(undelayed(true_robot), "complex")
     gait = problem.gaits["fast"].gait
     cycle = Timeline.of_gait(gait, gait.period_s)
     state = run.rest(problem.start.x, problem.start.y, problem.start.heading)
     for _ in range(cycles):
         before, state = state, run.run(cycle, state).final
-        foresight.learn(problem.as_planned(before), cycle, problem.as_planned(state))
-    return foresight, cycle, problem.as_planned(state)
+        ensemble.learn(problem.as_planned(before), cycle, problem.as_planned(state))
+    return ensemble, cycle, problem.as_planned(state)
 
 
 def test_unknown_friction_is_any(problem_in):
     problem = problem_in(corridor(0.2, 3.0))
-    foresight = Foresight(problem)
+    ensemble = FrictionEnsemble(problem)
     gait = problem.gaits["fast"].gait
     ahead = Timeline.of_gait(gait, 3 * gait.period_s)
     start = problem.start
     state = problem.run.rest(start.x, start.y + 0.02, 0.15)
-    rooms = [foresight.room_m(state, ahead, k) for k in range(len(FRICTIONS))]
+    rooms = [ensemble.room_m(state, ahead, k) for k in range(len(FRICTIONS))]
     assert max(rooms) - min(rooms) > 1e-4
-    assert foresight.least_room_m(state, ahead) == pytest.approx(min(rooms), abs=1e-12)
+    assert ensemble.least_room_m(state, ahead) == pytest.approx(min(rooms), abs=1e-12)
 
 
 def test_the_planned_robot_is_recognized(problem_in, robot):
-    foresight, cycle, state = driven(problem_in(corridor(0.3, 3.0)), robot)
-    assert foresight.likely == (1.0, 1.0)
-    assert foresight.least_room_m(state, cycle) == foresight.room_m(state, cycle)
+    ensemble, cycle, state = driven(problem_in(corridor(0.3, 3.0)), robot)
+    assert ensemble.likely == (1.0, 1.0)
+    assert ensemble.least_room_m(state, cycle) == ensemble.room_m(state, cycle)
 
 
 @pytest.mark.parametrize(("along", "across"), [(0.8, 0.8), (1.2, 1.2), (1.5, 1.0)])
