@@ -44,7 +44,7 @@ OWN = "its own"
 STRAIGHT_RAD_S = 0.02
 LIMIT_NODES, LIMIT_S = 6000, 60.0
 
-Ride = tuple[GaitTable, MotionTable]
+PlanRun = tuple[GaitTable, MotionTable]
 
 
 def own_family(robot: Robot, table: GaitTable) -> GaitTable:
@@ -64,9 +64,9 @@ def maze_named(name: str, size: RobotSize) -> Maze:
     return load_maze(f"mazes/{name}.yaml")
 
 
-def duration(robot: Robot, ride: Ride, maze: Maze, width: int | None) -> float | None:
+def duration(robot: Robot, run: PlanRun, maze: Maze, width: int | None) -> float | None:
     """Return the traverse time of the first certified plan, s; None without one."""
-    problem = Problem(robot, *ride, maze, MARGIN_M)
+    problem = Problem(robot, *run, maze, MARGIN_M)
     beams = BEAMS if width is None else (replace(BEAM, width=width),)
     plan = LatticeSolver(problem, beams=beams, time_limit_s=LIMIT_S).run(LIMIT_NODES).plan
     return plan.duration_s if plan else None
@@ -79,12 +79,12 @@ def compare(
     robot = wpi_srs()
     tables = {"whole table": table, OWN: own_family(robot, table)}
     tables |= {f"{p:g} kPa, {f:g} Hz, {lag:g} rad": wave_family(robot, f, p, lag) for f, p, lag in grid}
-    rides = {name: (gaits, load_motion(robot, gaits)) for name, gaits in tables.items()}
+    runs = {name: (gaits, load_motion(robot, gaits)) for name, gaits in tables.items()}
     size = RobotSize(robot.length_m, robot.body_width_m / 2, MARGIN_M)
     rows = []
     for name in names:
         maze = maze_named(name, size)
-        rows.append({ride: duration(robot, rides[ride], maze, width) for ride in rides})
+        rows.append({run: duration(robot, runs[run], maze, width) for run in runs})
         print(name, rows[-1], file=sys.stderr, flush=True)
     return rows
 
@@ -110,7 +110,7 @@ def section(
 ) -> Section:
     """Return the comparison as a table."""
     rows = compare(table, grid, names, width)
-    families = [ride for ride in rows[0] if ride != "whole table"]
+    families = [run for run in rows[0] if run != "whole table"]
     ours = [row["whole table"] for row in rows]
     own = [row[OWN] for row in rows]
     best = [min((row[f] for f in families if row[f] is not None), default=None) for row in rows]

@@ -26,7 +26,7 @@ Tell = Callable[[str], None]
 
 
 @dataclass(frozen=True)
-class Ride:
+class PlanRun:
     """One plan, and what the corrected robot makes of it.
 
     Attributes
@@ -34,7 +34,7 @@ class Ride:
     problem : Problem
         Of the robot that planned.
     plan : Plan
-    blind : Certificate
+    open_loop : Certificate
         The plan's valves played on the corrected robot without looking.
     driven : Execution
         The plan driven by the corrected robot with feedback every cycle.
@@ -42,34 +42,34 @@ class Ride:
 
     problem: Problem
     plan: Plan
-    blind: Certificate
+    open_loop: Certificate
     driven: Execution
 
     @property
     def away_m(self) -> float:
-        """Distance, at the end of the blind ride, from where the plan is then."""
-        end = min(self.plan.duration_s, float(self.blind.time_s[-1]))
-        planned, blind = (
+        """Distance, at the end of the open-loop run, from where the plan is then."""
+        end = min(self.plan.duration_s, float(self.open_loop.time_s[-1]))
+        planned, open_loop = (
             np.array([np.interp(end, c.time_s, c.pose[:, k]) for k in range(2)])
-            for c in (self.plan.certificate, self.blind)
+            for c in (self.plan.certificate, self.open_loop)
         )
-        return float(np.linalg.norm(planned - blind))
+        return float(np.linalg.norm(planned - open_loop))
 
     def to_record(self) -> dict[str, Any]:
         """Return one side of the `maze` entry of the command's JSON."""
         return {
             "planned_s": round(self.plan.duration_s, 3),
             "blind_end_away_m": round(self.away_m, 5),
-            "blind_clearance_m": round(self.blind.clearance_m, 5),
+            "blind_clearance_m": round(self.open_loop.clearance_m, 5),
             "driven": self.driven.to_record(),
         }
 
     def in_words(self) -> str:
         """Return what came of the plan."""
-        touched = "touching a wall" if self.blind.clearance_m <= 0 else "without touching"
+        touched = "touching a wall" if self.open_loop.clearance_m <= 0 else "without touching"
         end = f"in {self.driven.duration_s:.1f} s" if self.driven.reached else f"not: {self.driven.reason}"
         return (
-            f"promises {self.plan.duration_s:.1f} s; played without looking it ends "
+            f"promises {self.plan.duration_s:.1f} s; open loop it ends "
             f"{1e3 * self.away_m:.0f} mm from there, {touched}; driven with feedback it arrives {end}"
         )
 
@@ -81,12 +81,12 @@ class MazePayoff:
     Attributes
     ----------
     maze : Maze
-    before, after : Ride or None
+    before, after : PlanRun or None
     """
 
     maze: Maze
-    before: Ride | None
-    after: Ride | None
+    before: PlanRun | None
+    after: PlanRun | None
 
     def to_record(self) -> dict[str, Any]:
         """Return the `maze` entry of the command's JSON."""
@@ -99,8 +99,8 @@ class MazePayoff:
     def in_words(self) -> str:
         """Return a sentence."""
         said = [
-            f"the {which} robot's plan {'does not exist' if ride is None else ride.in_words()}"
-            for which, ride in (("calibrated", self.before), ("corrected", self.after))
+            f"the {which} robot's plan {'does not exist' if run is None else run.in_words()}"
+            for which, run in (("calibrated", self.before), ("corrected", self.after))
         ]
         return f"through {self.maze.name}, on the corrected robot: {'; '.join(said)}"
 
@@ -124,19 +124,19 @@ def maze_payoff(
         Gets messages about the progress.
     """
     truth = after[0]
-    rides = [_ride(robot, gait, truth, maze, model, tell) for robot, gait in (before, after)]
-    return MazePayoff(maze, *rides)
+    runs = [_run_plan(robot, gait, truth, maze, model, tell) for robot, gait in (before, after)]
+    return MazePayoff(maze, *runs)
 
 
-def _ride(robot: Robot, gait: Gait, truth: Robot, maze: Maze, model: str, tell: Tell) -> Ride | None:
+def _run_plan(robot: Robot, gait: Gait, truth: Robot, maze: Maze, model: str, tell: Tell) -> PlanRun | None:
     tell(f"planning through {maze.name}{' with the effects' if robot is truth else ''}")
     problem = _problem(robot, leaned_family(robot, gait, model), maze)
     plan = solve_with_lattice(problem, max_nodes=MOST_NODES, time_limit_s=TIME_LIMIT_S).plan
     if plan is None:
         return None
     tell("driving the plan on the corrected robot")
-    blind = certify(Problem(truth, problem.gaits, problem.motion, maze, MARGIN_M), plan.gaits)
-    return Ride(problem, plan, blind, execute(problem, plan, truth))
+    open_loop = certify(Problem(truth, problem.gaits, problem.motion, maze, MARGIN_M), plan.gaits)
+    return PlanRun(problem, plan, open_loop, execute(problem, plan, truth))
 
 
 def _problem(robot: Robot, table: GaitTable, maze: Maze) -> Problem:

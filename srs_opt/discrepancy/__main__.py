@@ -155,14 +155,14 @@ def _payoff(
     from planners.view.payoff_picture import payoff_figure
 
     sides = (gains.calibrated, gains.promised.gait), (gains.corrected, gains.after.gait)
-    rides = maze_payoff(*sides, maze, options.model, tell)
-    record["maze"] = rides.to_record() | {"words": rides.in_words()}
+    runs = maze_payoff(*sides, maze, options.model, tell)
+    record["maze"] = runs.to_record() | {"words": runs.in_words()}
     caption = (
         "Both plans are driven by the corrected robot, which stands for the real one: by the plan's valves "
         "alone (with the region that the body sweeps), and corrected every cycle"
     )
-    picture = encoded(payoff_figure(rides), "Plans before and after, and what comes of them", f"{caption}.")
-    return record, f"\n{gains.in_words()}\n{rides.in_words()}", [picture]
+    picture = encoded(payoff_figure(runs), "Plans before and after, and what comes of them", f"{caption}.")
+    return record, f"\n{gains.in_words()}\n{runs.in_words()}", [picture]
 
 
 def _effect_names(path: Path) -> list[str]:

@@ -51,7 +51,7 @@ class Played(Drift):
     def in_words(self) -> str:
         """Return what happened, in a line."""
         return (
-            f"{'agrees' if self.agrees else 'DISAGREES'}: the manoeuvre, played blind: "
+            f"{'agrees' if self.agrees else 'DISAGREES'}: the manoeuvre, played open loop: "
             f"{1e3 * self.drift_m:.1f} mm from ours after {self.way_m:.2f} m, turned by "
             f"{self.turn_rad:+.3f} rad (ours {self.our_turn_rad:+.3f})"
         )

@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 VERSION = 2  # of motion.json
 STAIR_S = 0.005  # of a changing pressure
 ROW_STEPS = 10  # steps from one look at the body to the next
-# How far the engine may be from our motion when it plays blind, over the way until then: small differences of
+# How far the engine may be from our motion when it plays open loop, over the way until then: small differences of
 # speed and turn rate add up.
 DRIFT_SHARE = 0.03
 LEAST_DRIFT_M = 0.01
@@ -44,7 +44,7 @@ class Phases:
 
 @dataclass(frozen=True)
 class Drift:
-    """A motion in the engine beside ours, both played without looking.
+    """A motion in the engine beside ours, both open loop.
 
     Attributes
     ----------
@@ -119,7 +119,7 @@ class Replay(Drift):
             touched = f"walls touched {self.contacts} times, first after {self.first_contact_s:.1f} s"
         goal = "goal reached" if self.reached else "goal not reached"
         return (
-            f"{'agrees' if self.agrees else 'DISAGREES'}: the {self.name} cycles, played blind: {goal}, "
+            f"{'agrees' if self.agrees else 'DISAGREES'}: the {self.name} cycles, played open loop: {goal}, "
             f"{touched}, smallest clearance {1e3 * self.smallest_clearance_m:.1f} mm; "
             f"{1e3 * self.drift_m:.0f} mm "
             f"from ours after {self.way_m:.2f} m"
