@@ -31,9 +31,9 @@ from srs_opt.orbit.laps import monodromy_kernel
 from srs_opt.orbit.steady import steady_gaits
 from srs_opt.robot import wpi_srs
 from srs_opt.simulate import compiled
+from srs_opt.simulate.batched import run_batched
 from srs_opt.simulate.integrate import Integrator
 from srs_opt.simulate.timeline import Timeline
-from srs_opt.simulate.together import together
 
 Curve = tuple[list[float], list[float]]
 
@@ -86,7 +86,7 @@ def _trials(sizes: list[int]) -> dict[str, Curve]:
         Timeline.of_gait(Wave.uniform(4, f, 50, 1.2).gait(), 2.0) for f in np.linspace(1, 2, max(sizes))
     ]
     costs = [
-        best_time(lambda: together([run.travel(t, run.rest()) for t in timelines[:size]]), 2)  # noqa: B023
+        best_time(lambda: run_batched([run.travel(t, run.rest()) for t in timelines[:size]]), 2)  # noqa: B023
         for size in sizes
     ]
     return {"2 s of motion each": ([float(s) for s in sizes], costs)}

@@ -18,9 +18,9 @@ from planners.search.problem import Problem
 from srs_opt.errors import NoAnswerError
 from srs_opt.orbit.body import integrator
 from srs_opt.robot import Robot
+from srs_opt.simulate.batched import run_batched
 from srs_opt.simulate.integrate import Integrator, Trajectory
 from srs_opt.simulate.timeline import Timeline
-from srs_opt.simulate.together import together
 
 Array = NDArray[np.float64]
 Cycle = tuple[int, int]  # gait before, gait
@@ -86,7 +86,7 @@ class FrictionEnsemble:
 
         Measured factors bend what is foreseen of a cycle (gait before, gait), here and below.
         """
-        foreseen = together([run.travel(timeline, self._begun(run, before)) for run in self._runs])
+        foreseen = run_batched([run.travel(timeline, self._begun(run, before)) for run in self._runs])
         bent = [
             outcome if isinstance(outcome, NoAnswerError) else self._bent(outcome, cycle)
             for outcome in foreseen

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planners.motion.table import SAMPLES
+from srs_opt.simulate.batched import Search
 from srs_opt.simulate.integrate import Integrator
 from srs_opt.simulate.mesh import Mesh
 from srs_opt.simulate.timeline import Timeline
-from srs_opt.simulate.together import Search
 
 Array = NDArray[np.float64]
 

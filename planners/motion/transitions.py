@@ -23,10 +23,10 @@ from srs_opt.orbit.actuators import periodic_actuators
 from srs_opt.orbit.body import integrator
 from srs_opt.orbit.steady import steady_gait
 from srs_opt.robot import Robot
+from srs_opt.simulate.batched import Search, run_batched
 from srs_opt.simulate.integrate import Integrator
 from srs_opt.simulate.rosenbrock import VELOCITY
 from srs_opt.simulate.shapes import centre_lines
-from srs_opt.simulate.together import Search, together
 
 LEVELS = 8  # forward speeds per gait before
 STEP_S = 0.003  # 1e-4 of the distance travelled in a cycle
@@ -158,7 +158,7 @@ def _all(searches: list[Search[_Outcome]]) -> list[_Outcome]:
         If one of them cannot be gone through.
     """
     outcomes = []
-    for outcome in together(searches):
+    for outcome in run_batched(searches):
         if isinstance(outcome, NoAnswerError):
             raise outcome
         outcomes.append(outcome)

@@ -25,9 +25,9 @@ from planners.search.problem import ROUNDING_M, Problem
 from planners.search.tree import Root, arrival_index, at_rest
 from srs_opt.errors import NoAnswerError
 from srs_opt.model.outline import POINTS_PER_ARC
+from srs_opt.simulate.batched import Search, run_batched
 from srs_opt.simulate.integrate import Trajectory
 from srs_opt.simulate.shapes import centre_lines
-from srs_opt.simulate.together import Search, together
 
 Array = NDArray[np.float64]
 # Of the coarsest integration, body lengths per second: at two lengths per second it errs by 0.0001 in 40.
@@ -134,7 +134,7 @@ class Certifier:
             self._known[level].keep(gaits)
         for index in range(len(gaits)):
             wanting = [level for level in levels if len(self._known[level].cycles) <= index]
-            found = together([self._cycle(gaits, index, level) for level in wanting])
+            found = run_batched([self._cycle(gaits, index, level) for level in wanting])
             for level, cycle in zip(wanting, found):
                 if isinstance(cycle, NoAnswerError):
                     raise cycle

@@ -19,8 +19,8 @@ from planners.plan.answer import Plan
 from planners.search.problem import Problem
 from planners.search.tree import at_rest
 from srs_opt.errors import NoAnswerError
+from srs_opt.simulate.batched import run_batched
 from srs_opt.simulate.shapes import centre_lines
-from srs_opt.simulate.together import together
 
 Array = NDArray[np.float64]
 THINNED = 3  # every third node, 6 ms apart: the deviations change slowly
@@ -134,7 +134,7 @@ def _closed_loop(problem: Problem, plan: Plan, tolerance: Tolerance) -> float:
             keys.append((k, b, gait))
             searches.append(problem.run.travel(problem.joints.timeline(b, gait), moved))
     least_m = float("inf")
-    for (k, b, gait), found in zip(keys, together(searches)):
+    for (k, b, gait), found in zip(keys, run_batched(searches)):
         if isinstance(found, NoAnswerError):
             return float("-inf")
         trajectory = problem.bent(found, b, gait)

@@ -15,9 +15,9 @@ from planners.refine.window import Window
 from srs_opt.errors import NoAnswerError
 from srs_opt.manoeuvre.certificate import seen_states
 from srs_opt.manoeuvre.shooting import Born, carried_on, jump_of
+from srs_opt.simulate.batched import run_batched
 from srs_opt.simulate.integrate import Integrator
 from srs_opt.simulate.kernel import Course
-from srs_opt.simulate.together import together
 
 Array = NDArray[np.float64]
 # Of the integration, body lengths per second; four times as much leaves derivatives off by a tenth at times
@@ -49,7 +49,7 @@ class WindowShot:
 def shoot_windows(run: Integrator, start: Array, windows: list[Window]) -> list[WindowShot | None]:
     """Simulate several windows from one state, side by side; None where the model cannot go on."""
     tolerance = TOLERANCE * run.robot.length_m
-    found = together([run.travel(window.timeline(), start, tolerance) for window in windows])
+    found = run_batched([run.travel(window.timeline(), start, tolerance) for window in windows])
     return [
         None
         if isinstance(path, NoAnswerError)

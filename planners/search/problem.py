@@ -26,9 +26,9 @@ from srs_opt.errors import NoAnswerError
 from srs_opt.gait_opt.table import GaitTable
 from srs_opt.orbit.body import integrator
 from srs_opt.robot import Robot
+from srs_opt.simulate.batched import run_batched
 from srs_opt.simulate.integrate import Integrator, Trajectory
 from srs_opt.simulate.shapes import centre_lines
-from srs_opt.simulate.together import together
 
 Array = NDArray[np.float64]
 ROUNDING_M = 1e-6
@@ -210,7 +210,7 @@ class Problem:
 
         The company makes no difference to a cycle; None stands for one that the model cannot go through.
         """
-        found = together([self._cycle(before, gait)(state) for state, before, gait in begins])
+        found = run_batched([self._cycle(before, gait)(state) for state, before, gait in begins])
         went = [
             (before, gait, outcome)
             for (_, before, gait), outcome in zip(begins, found)

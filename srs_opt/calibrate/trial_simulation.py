@@ -15,11 +15,11 @@ from srs_opt.measurement.records import Applied, Schedule, Trial
 from srs_opt.model.parameters import Structure
 from srs_opt.model.registry import state_layout
 from srs_opt.model.state import StateLayout
+from srs_opt.simulate.batched import Search, StepRequest, StepResult, run_one
 from srs_opt.simulate.integrate import step_kernel
 from srs_opt.simulate.kernel import Kernel
 from srs_opt.simulate.mesh import Mesh
 from srs_opt.simulate.timeline import Timeline
-from srs_opt.simulate.together import Search, Stretch, Stretched, alone
 
 STEP_S = 0.005
 # local error of the body's speed per step; 5e-6 keeps the track within about 0.01 mm, well below what a
@@ -153,7 +153,7 @@ class TrialRun:
         NoAnswerError
             If the motion stops being finite.
         """
-        return alone(self.search(values, tolerance_m_s))
+        return run_one(self.search(values, tolerance_m_s))
 
     def search(
         self, values: Values, tolerance_m_s: float = TOLERANCE_M_S, attempts: int = ATTEMPTS
@@ -203,7 +203,7 @@ class TrialRun:
         kept = self.meshes.get(key) or self.meshes.get((tolerance, number - 1))
         mesh = _fitted(kept, piece.duration_s, phases) or Mesh.uniform(piece.duration_s, STEP_S)
         for attempt in range(attempts):
-            got = yield Stretch(kernel, x, mesh, piece.valve, p)
+            got = yield StepRequest(kernel, x, mesh, piece.valve, p)
             _check(got)
             fine = got.error_m_s.max() <= ACCEPTED * tolerance
             # a mesh from where the motion nearly broke down would slow all that follow
@@ -231,7 +231,7 @@ def _fitted(
     return Mesh(mesh.h_s * stretch[mesh.phase], mesh.phase)
 
 
-def _check(got: Stretched) -> None:
+def _check(got: StepResult) -> None:
     if not np.isfinite(got.states[:, -1]).all():
         raise NoAnswerError("the simulated motion of a trial stops being finite; effect sizes out of range")
 

@@ -24,7 +24,7 @@ from srs_opt.calibrate.whiten import Whitening
 from srs_opt.errors import NoAnswerError
 from srs_opt.measurement.records import Trial
 from srs_opt.robot import Robot
-from srs_opt.simulate.together import together
+from srs_opt.simulate.batched import run_batched
 
 AT_ONCE = 48  # trials whose motions are in memory together: enough to fill the lanes
 ROUGHER = 5.0  # times the tolerance, for fits whose misfit hides it
@@ -203,7 +203,7 @@ class Trials:
         rest = [n for n in names if n not in known]
         attempts = [1 if self._last.get(n) == wanted[n] else ATTEMPTS for n in rest]
         searches = [self.runs[n].search(point.of_trial(n), tolerance, a) for n, a in zip(rest, attempts)]
-        for name, nodes in zip(rest, together(searches)):
+        for name, nodes in zip(rest, run_batched(searches)):
             known[name] = nodes
             self._motions.pop(name, None)
             self._last.pop(name, None)

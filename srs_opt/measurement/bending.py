@@ -25,9 +25,9 @@ from srs_opt.measurement.records import Array, StepTest
 from srs_opt.measurement.steps import StepFit, fit_steps, step_response
 from srs_opt.model.effects import known_effects
 from srs_opt.robot import Robot
+from srs_opt.simulate.batched import run_batched
 from srs_opt.simulate.integrate import Integrator
 from srs_opt.simulate.timeline import Timeline
-from srs_opt.simulate.together import together
 
 # a tenth changes the loss of bend by 0.1 % of itself and doubles the time, ten times as much loses 3 %
 FRICTION_SPEED_M_S = 3e-5
@@ -202,7 +202,7 @@ class _Problem:
             timeline = Timeline.constant(end, valve, test.pressure_kpa, NO_RHYTHM_HZ)
             searches.append(run.travel(timeline, run.rest(), TOLERANCE_M_S))
         curves = []
-        for (k, _, _), path in zip(wanted, together(searches)):
+        for (k, _, _), path in zip(wanted, run_batched(searches)):
             if isinstance(path, NoAnswerError):
                 raise path
             test = self.pairs[k].ground

@@ -14,7 +14,7 @@ from srs_opt.orbit.body import integrator
 from srs_opt.orbit.solve import Cycle, reached_from
 from srs_opt.orbit.steady import Orbit, orbit_of
 from srs_opt.robot import Robot
-from srs_opt.simulate.together import together
+from srs_opt.simulate.batched import run_batched
 
 # forward speeds of the starts over body lengths per period; no snake of this kind reaches one
 STARTS = (-0.5, 0.25, 0.5, 0.75, 1.0)
@@ -42,7 +42,7 @@ def other_orbits(robot: Robot, orbit: Orbit, model: str | None = None) -> list[O
     pace = robot.segments * robot.pitch_m / gait.period_s
     starts = [np.concatenate([[share * pace, 0.0, 0.0], bends]) for share in STARTS]
     found: list[Orbit] = []
-    for solution in together([reached_from(run, gait, start) for start in starts]):
+    for solution in run_batched([reached_from(run, gait, start) for start in starts]):
         if isinstance(solution, NoAnswerError):
             continue
         other = orbit_of(run, gait, solution)

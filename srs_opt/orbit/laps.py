@@ -14,11 +14,11 @@ import numpy as np
 
 from srs_opt.model.parameters import Structure
 from srs_opt.model.registry import build, state_layout
+from srs_opt.simulate.batched import Search, StepRequest
 from srs_opt.simulate.integrate import Integrator, step_kernel
 from srs_opt.simulate.kernel import LANES, Course, Kernel
 from srs_opt.simulate.mesh import Mesh
 from srs_opt.simulate.rosenbrock import VELOCITY, step_function
-from srs_opt.simulate.together import Search, Stretch
 
 HAIR_M_S = 1e-8  # far below any smoothing speed of friction; rounding costs 1e-8 of a derivative
 
@@ -55,7 +55,7 @@ def lap(
     if run.structure.compliant:
         return _varied(run, x, mesh, valve, p, HAIR_M_S / scale)
     kernel = monodromy_kernel(run.structure)
-    got = yield Stretch(kernel, np.concatenate([x, np.eye(3).ravel()]), mesh, valve, p)
+    got = yield StepRequest(kernel, np.concatenate([x, np.eye(3).ravel()]), mesh, valve, p)
     monodromy = got.states[run.states :, -1].reshape(3, 3, order="F")
     states = got.states[: run.states]
     return Lapped(states, got.error_m_s, states[dynamic, -1], monodromy)
@@ -63,7 +63,7 @@ def lap(
 
 def plain_lap(run: Integrator, x: np.ndarray, mesh: Mesh, valve: np.ndarray, p: np.ndarray) -> Search[Lapped]:
     """Integrate as `lap` does, faster, without the derivative (not-a-number)."""
-    got = yield Stretch(step_kernel(run.structure), x, mesh, valve, p)
+    got = yield StepRequest(step_kernel(run.structure), x, mesh, valve, p)
     dynamic = run.layout.dynamic
     unknown = np.full((len(dynamic), len(dynamic)), np.nan)
     return Lapped(got.states, got.error_m_s, got.states[dynamic, -1], unknown)

@@ -24,10 +24,10 @@ from srs_opt.model.registry import build
 from srs_opt.model.state import WORK
 from srs_opt.orbit.actuators import periodic_actuators
 from srs_opt.orbit.laps import Lapped, lap, plain_lap
+from srs_opt.simulate.batched import Search
 from srs_opt.simulate.integrate import LOOSE, TOLERANCE_M_S, Integrator
 from srs_opt.simulate.mesh import Mesh
 from srs_opt.simulate.tableau import LEVER_M
-from srs_opt.simulate.together import Search
 
 _NEWTON_STEPS = 30
 _CLOSED_M_S = 1e-9

@@ -20,9 +20,9 @@ from srs_opt.parallel import executor
 from srs_opt.parallel.sweep import sweep
 from srs_opt.result import Result
 from srs_opt.robot import Robot
+from srs_opt.simulate.batched import Search, run_batched, run_one
 from srs_opt.simulate.integrate import TOLERANCE_M_S, Integrator
 from srs_opt.simulate.rosenbrock import WORK
-from srs_opt.simulate.together import Search, alone, together
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -156,7 +156,7 @@ def steady_gait(
         If no steady state is found.
     """
     run = integrator(robot, model)
-    return alone(_search(run, gait, tolerance, guess))
+    return run_one(_search(run, gait, tolerance, guess))
 
 
 def steady_gaits(
@@ -193,7 +193,7 @@ def _side_by_side(
     parts = np.array_split(np.arange(len(gaits)), min(CHAINS, max(len(gaits), 1)))
     chains = [_chain(run, [gaits[i] for i in part], tolerance) for part in parts]
     found: list[Orbit | NoAnswerError] = []
-    for chain in together(chains):
+    for chain in run_batched(chains):
         if isinstance(chain, NoAnswerError):  # a chain answers for each of its gaits
             raise chain
         found += chain

@@ -13,11 +13,11 @@ from srs_opt.model.parameters import Structure, valve_delay_s
 from srs_opt.model.registry import build, state_layout
 from srs_opt.model.state import POSE, VELOCITY, WORK, StateLayout
 from srs_opt.robot import Robot
+from srs_opt.simulate.batched import Search, StepRequest, run_one
 from srs_opt.simulate.kernel import Kernel
 from srs_opt.simulate.mesh import Mesh
 from srs_opt.simulate.rosenbrock import step_function
 from srs_opt.simulate.timeline import Timeline
-from srs_opt.simulate.together import Search, Stretch, alone
 
 _REFINEMENTS = 3  # of a mesh, coarser here and finer there; after them it only gets finer
 _ATTEMPTS = 12
@@ -122,7 +122,7 @@ class Integrator:
         NoAnswerError
             If the state stops being finite.
         """
-        return alone(self.stepping(x, mesh, valve, p))
+        return run_one(self.stepping(x, mesh, valve, p))
 
     def run(self, timeline: Timeline, x: np.ndarray, tolerance: float = TOLERANCE_M_S) -> Trajectory:
         """Integrate over a whole timeline from state `x` (the robot's valve delay is applied here).
@@ -132,7 +132,7 @@ class Integrator:
         NoAnswerError
             If the state stops being finite.
         """
-        return alone(self.travel(timeline, x, tolerance))
+        return run_one(self.travel(timeline, x, tolerance))
 
     def travel(
         self, timeline: Timeline, x: np.ndarray, tolerance: float = TOLERANCE_M_S
@@ -208,7 +208,7 @@ class Integrator:
         self, x: np.ndarray, mesh: Mesh, valve: np.ndarray, p: np.ndarray
     ) -> Search[tuple[np.ndarray, np.ndarray]]:
         """Do what `steps` does, as a search: see `together` for many at once."""
-        got = yield Stretch(self.kernel, x, mesh, valve, p)
+        got = yield StepRequest(self.kernel, x, mesh, valve, p)
         if not np.isfinite(got.states[:, -1]).all():
             bad = int(np.argmax(~np.isfinite(got.states).all(axis=0)))
             raise NoAnswerError(

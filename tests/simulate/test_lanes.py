@@ -9,12 +9,12 @@ from srs_opt.model.parameters import Structure
 from srs_opt.orbit.steady import Orbit, steady_gait, steady_gaits
 from srs_opt.robot import wpi_srs
 from srs_opt.simulate import compiled, kernel, lanes
+from srs_opt.simulate.batched import run_batched
 from srs_opt.simulate.integrate import Integrator
 from srs_opt.simulate.kernel import Course, Kernel
 from srs_opt.simulate.lanes import step_source
 from srs_opt.simulate.rosenbrock import step_function
 from srs_opt.simulate.timeline import Timeline
-from srs_opt.simulate.together import together
 
 
 def toy():
@@ -120,7 +120,7 @@ def test_simulations_side_by_side_are_the_same_as_alone():
     lines = [
         Timeline.of_gait(Wave.uniform(4, f, 50, 1.2, 0.2).gait(), 1.5 + f) for f in (1, 1.3, 1.6, 1.8, 2)
     ]
-    paths = together([run.travel(line, run.rest()) for line in lines])
+    paths = run_batched([run.travel(line, run.rest()) for line in lines])
     for path, line in zip(paths, lines):
         assert np.array_equal(path.pose, run.run(line, run.rest()).pose)
 
@@ -130,5 +130,5 @@ def test_searches_that_want_nothing_do_not_stop_the_others():
         return k
         yield
 
-    assert together([idle(k) for k in range(100)]) == list(range(100))
-    assert together([]) == []
+    assert run_batched([idle(k) for k in range(100)]) == list(range(100))
+    assert run_batched([]) == []

@@ -23,7 +23,7 @@ T = TypeVar("T")
 
 
 @dataclass(frozen=True)
-class Stretch:
+class StepRequest:
     """A wish: take `kernel` from state `x` (nx,) over `mesh` with `valve` (N-1, phases) held and `p`."""
 
     kernel: Kernel
@@ -34,25 +34,25 @@ class Stretch:
 
 
 @dataclass(frozen=True)
-class Stretched:
+class StepResult:
     """What came of it: states (nx, n) after each step and estimated errors (n,), m/s."""
 
     states: np.ndarray
     error_m_s: np.ndarray
 
 
-Search = Generator[Stretch, Stretched, T]
+Search = Generator[StepRequest, StepResult, T]
 
 
-def together(searches: Sequence[Search[T]]) -> list[T | NoAnswerError]:
+def run_batched(searches: Sequence[Search[T]]) -> list[T | NoAnswerError]:
     """Run searches side by side; return what each found, or why it found nothing.
 
     Lanes never mix, so the company makes no difference to a result.
     """
     results: list[T | NoAnswerError] = [NoAnswerError("not searched")] * len(searches)
-    waiting: dict[Kernel, list[tuple[int, Stretch]]] = {}
+    waiting: dict[Kernel, list[tuple[int, StepRequest]]] = {}
 
-    def advance(index: int, stretched: Stretched | None) -> None:
+    def advance(index: int, stretched: StepResult | None) -> None:
         search = searches[index]
         try:
             wish = next(search) if stretched is None else search.send(stretched)
@@ -80,7 +80,7 @@ def together(searches: Sequence[Search[T]]) -> list[T | NoAnswerError]:
     return results
 
 
-def alone(search: Search[T]) -> T:
+def run_one(search: Search[T]) -> T:
     """Run one search.
 
     Raises
@@ -88,14 +88,14 @@ def alone(search: Search[T]) -> T:
     NoAnswerError
         As the search does.
     """
-    (result,) = together([search])
+    (result,) = run_batched([search])
     if isinstance(result, NoAnswerError):
         raise result
     return result
 
 
-def _stretched(kernel: Kernel, wishes: Sequence[Stretch]) -> list[Stretched]:
+def _stretched(kernel: Kernel, wishes: Sequence[StepRequest]) -> list[StepResult]:
     courses = [Course(w.x, w.mesh.h_s, w.valve.T[w.mesh.phase], w.p) for w in wishes]
     states, errors = kernel.run(courses)
     sizes = [w.mesh.h_s.size for w in wishes]
-    return [Stretched(np.ascontiguousarray(states[:n, :, k].T), errors[:n, k]) for k, n in enumerate(sizes)]
+    return [StepResult(np.ascontiguousarray(states[:n, :, k].T), errors[:n, k]) for k, n in enumerate(sizes)]
