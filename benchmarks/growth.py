@@ -27,7 +27,7 @@ from srs_opt.gait import Wave
 from srs_opt.gait_map.grid import grid_points, map_at
 from srs_opt.gait_opt.catalogue import shipped_table
 from srs_opt.orbit.body import integrator
-from srs_opt.orbit.laps import monodromy_kernel
+from srs_opt.orbit.period_map import monodromy_kernel
 from srs_opt.orbit.steady import steady_gaits
 from srs_opt.robot import wpi_srs
 from srs_opt.simulate import compiled

@@ -19,7 +19,7 @@ from srs_opt.gait import Wave
 from srs_opt.model.parameters import GAIT_PARAMETERS, Structure
 from srs_opt.model.registry import build
 from srs_opt.orbit.body import integrator
-from srs_opt.orbit.laps import tangent_kernel
+from srs_opt.orbit.period_map import tangent_kernel
 from srs_opt.orbit.steady import Orbit
 from srs_opt.robot import Robot
 from srs_opt.simulate.integrate import Integrator

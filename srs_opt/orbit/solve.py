@@ -23,7 +23,7 @@ from srs_opt.model.parameters import Structure
 from srs_opt.model.registry import build
 from srs_opt.model.state import WORK
 from srs_opt.orbit.actuators import periodic_actuators
-from srs_opt.orbit.laps import Lapped, lap, plain_lap
+from srs_opt.orbit.period_map import PeriodMap, period_map, plain_period_map
 from srs_opt.simulate.batched import Search
 from srs_opt.simulate.integrate import LOOSE, TOLERANCE_M_S, Integrator
 from srs_opt.simulate.mesh import Mesh
@@ -100,7 +100,7 @@ def search_orbit(
     try:
         dynamic = np.zeros(len(run.layout.dynamic)) if guess is None else guess
         for _ in range(_WARM_UP_PERIODS if guess is None else 0):
-            dynamic = (yield from cycle.plain_lap(dynamic, mesh)).dynamic
+            dynamic = (yield from cycle.plain_period_map(dynamic, mesh)).dynamic
         return (yield from _closed(cycle, dynamic, mesh, tolerance))
     except NoAnswerError:  # a misleading guess, or even steps too long for this motion
         if run.structure.compliant:
@@ -136,10 +136,10 @@ def _reached_from(cycle: Cycle, x: np.ndarray, mesh: Mesh, tolerance: float) -> 
     settled, goal = 0, _NEARLY_M_S
     before = x[cycle.run.layout.dynamic]
     for count in range(_MOST_PERIODS):
-        lapped, mesh = yield from _accurate_lap(cycle, x, mesh, tolerance)
-        x = lapped.states[:, -1].copy()
+        mapped, mesh = yield from _accurate_period_map(cycle, x, mesh, tolerance)
+        x = mapped.states[:, -1].copy()
         x[:3], x[WORK] = 0.0, 0.0
-        change, before = cycle.size(lapped.dynamic - before), lapped.dynamic
+        change, before = cycle.size(mapped.dynamic - before), mapped.dynamic
         settled = settled + 1 if change < goal else 0
         if settled < _QUIET_PERIODS:
             continue
@@ -161,24 +161,26 @@ def _reached_from(cycle: Cycle, x: np.ndarray, mesh: Mesh, tolerance: float) -> 
     )
 
 
-def _accurate_lap(cycle: Cycle, x: np.ndarray, mesh: Mesh, tolerance: float) -> Search[tuple[Lapped, Mesh]]:
-    """Return a lap from state `x` on a mesh that is fine enough for it."""
+def _accurate_period_map(
+    cycle: Cycle, x: np.ndarray, mesh: Mesh, tolerance: float
+) -> Search[tuple[PeriodMap, Mesh]]:
+    """Return the period map from state `x` on a mesh that is fine enough for it."""
     for attempt in range(3 * _REFINEMENTS):
-        lapped = yield from plain_lap(cycle.run, x, mesh, cycle.valve, cycle.p)
+        mapped = yield from plain_period_map(cycle.run, x, mesh, cycle.valve, cycle.p)
         for _ in range(_HALVINGS):  # steps can be so long that the motion leaves what numbers can hold
-            if np.isfinite(lapped.states[:, -1]).all():
+            if np.isfinite(mapped.states[:, -1]).all():
                 break
             mesh = mesh.halved()
-            lapped = yield from plain_lap(cycle.run, x, mesh, cycle.valve, cycle.p)
-        if not np.isfinite(lapped.states[:, -1]).all():
+            mapped = yield from plain_period_map(cycle.run, x, mesh, cycle.valve, cycle.p)
+        if not np.isfinite(mapped.states[:, -1]).all():
             raise cycle.no_answer(
                 "the motion stops being finite; check pressure, masses, time constants and effect sizes"
             )
-        if lapped.error_m_s.max() <= LOOSE * tolerance:
+        if mapped.error_m_s.max() <= LOOSE * tolerance:
             break
         least = tolerance if attempt >= _REFINEMENTS else 0.0  # from then on it only gets finer
-        mesh = mesh.refined(np.maximum(lapped.error_m_s, least), tolerance)
-    return lapped, mesh
+        mesh = mesh.refined(np.maximum(mapped.error_m_s, least), tolerance)
+    return mapped, mesh
 
 
 @dataclass(frozen=True)
@@ -211,13 +213,13 @@ class Cycle:
         x[self.run.layout.actuator] = self.act
         return x
 
-    def lap(self, dynamic: np.ndarray, mesh: Mesh) -> Search[Lapped]:
-        """Return a lap with its monodromy matrix."""
-        return lap(self.run, self.start(dynamic), mesh, self.valve, self.p, self.scale)
+    def period_map(self, dynamic: np.ndarray, mesh: Mesh) -> Search[PeriodMap]:
+        """Return the period map with its monodromy matrix."""
+        return period_map(self.run, self.start(dynamic), mesh, self.valve, self.p, self.scale)
 
-    def plain_lap(self, dynamic: np.ndarray, mesh: Mesh) -> Search[Lapped]:
-        """Return a lap without derivative."""
-        return plain_lap(self.run, self.start(dynamic), mesh, self.valve, self.p)
+    def plain_period_map(self, dynamic: np.ndarray, mesh: Mesh) -> Search[PeriodMap]:
+        """Return the period map without derivative."""
+        return plain_period_map(self.run, self.start(dynamic), mesh, self.valve, self.p)
 
     def no_answer(self, why: str) -> NoAnswerError:
         """Return the error that names the gait."""
@@ -237,50 +239,50 @@ def _closed(
     A mesh that is `adapted` already is never made coarser: this motion needs it.
     """
     total = 0
-    lapped: Lapped | None = None
+    mapped: PeriodMap | None = None
     # an even mesh finds the orbit roughly; only there is the mesh worth adapting (friction's sharp
     # features move with the motion), then Newton finishes on the adapted mesh
     goals = [_CLOSED_M_S] * _MESHES if adapted else [_ROUGH_M_S, *[_CLOSED_M_S] * _MESHES]
     for attempt, goal_m_s in enumerate(goals):
-        if lapped is not None:
+        if mapped is not None:
             wanted = tolerance / attempt  # finer each time, so that this ends
-            mesh = mesh.refined(np.maximum(lapped.error_m_s, wanted if adapted else 0.0), wanted)
-        dynamic, lapped, count = yield from _newton(cycle, dynamic, mesh, goal_m_s)
+            mesh = mesh.refined(np.maximum(mapped.error_m_s, wanted if adapted else 0.0), wanted)
+        dynamic, mapped, count = yield from _newton(cycle, dynamic, mesh, goal_m_s)
         total += count
-        size = cycle.size(lapped.dynamic - dynamic)
+        size = cycle.size(mapped.dynamic - dynamic)
         closed = size <= max(goal_m_s, 1e-6)
         if not closed and (attempt == len(goals) - 1 or not size <= _ROUGH_M_S):
             raise cycle.no_answer(
                 f"after {total} Newton steps the body's speed still changes by {size:.2g} m/s per cycle"
             )
-        if closed and goal_m_s == _CLOSED_M_S and lapped.error_m_s.max() <= LOOSE * tolerance:
+        if closed and goal_m_s == _CLOSED_M_S and mapped.error_m_s.max() <= LOOSE * tolerance:
             break
-    assert lapped is not None
-    monodromy = cycle.scale[:, None] * lapped.monodromy / cycle.scale
-    return PeriodicSolution(cycle.start(dynamic), lapped.states, mesh, cycle.valve, monodromy, size)
+    assert mapped is not None
+    monodromy = cycle.scale[:, None] * mapped.monodromy / cycle.scale
+    return PeriodicSolution(cycle.start(dynamic), mapped.states, mesh, cycle.valve, monodromy, size)
 
 
 def _newton(
     cycle: Cycle, dynamic: np.ndarray, mesh: Mesh, goal_m_s: float
-) -> Search[tuple[np.ndarray, Lapped, int]]:
-    """Return the dynamic states, the lap from it, and how many steps it took; settles where Newton stalls."""
-    lapped = yield from cycle.lap(dynamic, mesh)
+) -> Search[tuple[np.ndarray, PeriodMap, int]]:
+    """Return the dynamic states, the period map there, and how many steps it took; settles where Newton stalls."""
+    mapped = yield from cycle.period_map(dynamic, mesh)
     count = 0
-    while (size := cycle.size(lapped.dynamic - dynamic)) > goal_m_s and count < _NEWTON_STEPS:
+    while (size := cycle.size(mapped.dynamic - dynamic)) > goal_m_s and count < _NEWTON_STEPS:
         count += 1
-        step = _newton_direction(lapped.monodromy, lapped.dynamic - dynamic)
+        step = _newton_direction(mapped.monodromy, mapped.dynamic - dynamic)
         for factor in (1.0, 0.3, 0.1) if np.isfinite(step).all() else ():
             trial = dynamic + factor * step
-            there = yield from cycle.lap(trial, mesh)
+            there = yield from cycle.period_map(trial, mesh)
             if cycle.size(there.dynamic - trial) < (1 - 0.1 * factor) * size:
                 break
         else:  # no descent along Newton's direction: let the motion itself settle
             trial = dynamic
             for _ in range(_SETTLE_PERIODS):
-                trial = (yield from cycle.plain_lap(trial, mesh)).dynamic
-            there = yield from cycle.lap(trial, mesh)
-        dynamic, lapped = trial, there
-    return dynamic, lapped, count
+                trial = (yield from cycle.plain_period_map(trial, mesh)).dynamic
+            there = yield from cycle.period_map(trial, mesh)
+        dynamic, mapped = trial, there
+    return dynamic, mapped, count
 
 
 def _newton_direction(m: np.ndarray, residual: np.ndarray) -> np.ndarray:
@@ -295,8 +297,8 @@ def _settled(cycle: Cycle, mesh: Mesh, tolerance: float) -> Search[tuple[np.ndar
     """Return the dynamic states after some periods from rest and a mesh on which that motion is accurate."""
     dynamic, mesh = np.zeros(len(cycle.run.layout.dynamic)), mesh.halved().halved()
     for _ in range(_SETTLING_PERIODS):
-        lapped, mesh = yield from _accurate_lap(cycle, cycle.start(dynamic), mesh, tolerance)
-        dynamic = lapped.dynamic
+        mapped, mesh = yield from _accurate_period_map(cycle, cycle.start(dynamic), mesh, tolerance)
+        dynamic = mapped.dynamic
     return dynamic, mesh
 
 

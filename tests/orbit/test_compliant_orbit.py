@@ -8,7 +8,7 @@ import pytest
 
 from srs_opt.gait import Wave
 from srs_opt.orbit.attractors import other_orbits
-from srs_opt.orbit.laps import tangent_kernel
+from srs_opt.orbit.period_map import tangent_kernel
 from srs_opt.orbit.sensitivity import sensitivity
 from srs_opt.orbit.steady import steady_gait, steady_gaits
 from srs_opt.robot import wpi_srs

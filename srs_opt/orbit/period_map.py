@@ -1,4 +1,4 @@
-"""One lap of a gait, with the derivative of what it repeats at its end by that at its start.
+"""The period map of a gait, with the derivative of what it repeats at its end by that at its start.
 
 What a gait repeats are the dynamic states (`StateLayout.dynamic`): the body's velocity, and in the compliant
 model the bends and their rates.
@@ -24,8 +24,8 @@ HAIR_M_S = 1e-8  # far below any smoothing speed of friction; rounding costs 1e-
 
 
 @dataclass(frozen=True)
-class Lapped:
-    """What came of a lap.
+class PeriodMap:
+    """The state after one period, and its derivative.
 
     Attributes
     ----------
@@ -44,9 +44,9 @@ class Lapped:
     monodromy: np.ndarray
 
 
-def lap(
+def period_map(
     run: Integrator, x: np.ndarray, mesh: Mesh, valve: np.ndarray, p: np.ndarray, scale: np.ndarray
-) -> Search[Lapped]:
+) -> Search[PeriodMap]:
     """Integrate over `mesh` with `valve` (N-1, phases) held, from state `x` (nx,).
 
     `scale` (d,) makes the dynamic states comparable, as speeds.
@@ -58,21 +58,23 @@ def lap(
     got = yield StepRequest(kernel, np.concatenate([x, np.eye(3).ravel()]), mesh, valve, p)
     monodromy = got.states[run.states :, -1].reshape(3, 3, order="F")
     states = got.states[: run.states]
-    return Lapped(states, got.error_m_s, states[dynamic, -1], monodromy)
+    return PeriodMap(states, got.error_m_s, states[dynamic, -1], monodromy)
 
 
-def plain_lap(run: Integrator, x: np.ndarray, mesh: Mesh, valve: np.ndarray, p: np.ndarray) -> Search[Lapped]:
-    """Integrate as `lap` does, faster, without the derivative (not-a-number)."""
+def plain_period_map(
+    run: Integrator, x: np.ndarray, mesh: Mesh, valve: np.ndarray, p: np.ndarray
+) -> Search[PeriodMap]:
+    """Integrate as `period_map` does, faster, without the derivative (not-a-number)."""
     got = yield StepRequest(step_kernel(run.structure), x, mesh, valve, p)
     dynamic = run.layout.dynamic
     unknown = np.full((len(dynamic), len(dynamic)), np.nan)
-    return Lapped(got.states, got.error_m_s, got.states[dynamic, -1], unknown)
+    return PeriodMap(got.states, got.error_m_s, got.states[dynamic, -1], unknown)
 
 
 def _varied(
     run: Integrator, x: np.ndarray, mesh: Mesh, valve: np.ndarray, p: np.ndarray, hair: np.ndarray
-) -> Lapped:
-    """Return the lap with the derivative from laps whose starts differ by a hair in one entry each.
+) -> PeriodMap:
+    """Return the period map with the derivative from integrations whose starts differ by a hair in one entry each.
 
     On a mesh that is kept the integration is a smooth function of its start, and several starts share each
     call of the compiled step: a third of what tangents cost, and no further code to compile.
@@ -88,7 +90,7 @@ def _varied(
         if k == 0:
             path, error = states[:, :, 0].T, errors[:, 0]
     last = np.concatenate(ends)[:, dynamic]
-    return Lapped(path, error, last[0], ((last[1:] - last[0]) / hair[:, None]).T)
+    return PeriodMap(path, error, last[0], ((last[1:] - last[0]) / hair[:, None]).T)
 
 
 def monodromy_step(structure: Structure) -> ca.Function:
