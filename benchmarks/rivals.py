@@ -15,8 +15,8 @@ from srs_opt.gait import Gait, Wave
 from srs_opt.model.parameters import Structure
 from srs_opt.model.registry import build
 from srs_opt.robot import Robot
-from srs_opt.simulate.buffered import Buffered
 from srs_opt.simulate.compiled import compiled, compiler
+from srs_opt.simulate.zero_copy import ZeroCopy
 
 
 @lru_cache(maxsize=1)
@@ -59,9 +59,9 @@ def _ode(robot: Robot) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
 Rival = Callable[[np.ndarray, np.ndarray, float], np.ndarray]
 
 
-def _compiled(robot: Robot, name: str, inputs: list[ca.SX], value: ca.SX) -> Buffered:
+def _compiled(robot: Robot, name: str, inputs: list[ca.SX], value: ca.SX) -> ZeroCopy:
     key = f"benchmark {name} {Structure.of(robot)}"
-    return Buffered(compiled(key, lambda: ca.Function(name, inputs, [value], {"cse": True})))
+    return ZeroCopy(compiled(key, lambda: ca.Function(name, inputs, [value], {"cse": True})))
 
 
 def scipy_rival(robot: Robot, p: np.ndarray, method: str, tolerance: float) -> Rival:
@@ -72,7 +72,7 @@ def scipy_rival(robot: Robot, p: np.ndarray, method: str, tolerance: float) -> R
     f = _compiled(robot, "rates", [x, valve, parameters], rates)
     j = _compiled(robot, "jacobian", [x, valve, parameters], ca.densify(ca.jacobian(rates, x)))
 
-    def call(function: Buffered, state: np.ndarray, valves: np.ndarray) -> np.ndarray:
+    def call(function: ZeroCopy, state: np.ndarray, valves: np.ndarray) -> np.ndarray:
         function.arguments[0][0], function.arguments[1][0], function.arguments[2][0] = state, valves, p
         function.evaluate()
         return function.results[0]

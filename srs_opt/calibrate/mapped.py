@@ -5,7 +5,7 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
-from srs_opt.simulate.buffered import buffered
+from srs_opt.simulate.zero_copy import zero_copy
 
 MAP = 64  # nodes per call of the compiled functions
 
@@ -22,7 +22,7 @@ def mapped(single: ca.Function, repeated: tuple[int, ...]) -> ca.Function:
 
 def evaluate(function: ca.Function, moving: tuple[np.ndarray, ...], *fixed: np.ndarray) -> list[np.ndarray]:
     """Evaluate a mapped function at all rows of `moving`; outputs have one row per node."""
-    call = buffered(function)
+    call = zero_copy(function)
     for argument, value in zip(call.arguments[len(moving) :], fixed):
         argument[0] = value
     n = moving[0].shape[0]

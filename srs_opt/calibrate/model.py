@@ -20,7 +20,7 @@ from srs_opt.model.effects.effect import OUTSIDE, Effect
 from srs_opt.model.parameters import COMPLIANCE_PARAMETERS, Structure, effect_symbols
 from srs_opt.model.registry import build
 from srs_opt.robot import Robot
-from srs_opt.simulate.buffered import Buffered
+from srs_opt.simulate.zero_copy import ZeroCopy
 
 # hooks that only change a parameter of the robot, which is packed changed: no equation has to hold them
 _FOLDED = {
@@ -179,7 +179,7 @@ class Model:
         """Return a coordinate's value where a point says nothing."""
         return float(self._defaults[self._column[name]])
 
-    def _set(self, function: Buffered, values: Values, conditions: Conditions) -> None:
+    def _set(self, function: ZeroCopy, values: Values, conditions: Conditions) -> None:
         coordinates, bench, now = function.arguments
         coordinates[0] = self._defaults
         for name, value in values.items():
@@ -189,12 +189,12 @@ class Model:
         function.evaluate()
 
     @cached_property
-    def _packing(self) -> Buffered:
-        return Buffered(_functions(self.full, self.forms, self._names, self.camera)[0])
+    def _packing(self) -> ZeroCopy:
+        return ZeroCopy(_functions(self.full, self.forms, self._names, self.camera)[0])
 
     @cached_property
-    def _slopes(self) -> Buffered:
-        return Buffered(_functions(self.full, self.forms, self._names, self.camera)[1])
+    def _slopes(self) -> ZeroCopy:
+        return ZeroCopy(_functions(self.full, self.forms, self._names, self.camera)[1])
 
     def __getstate__(self) -> dict[str, object]:  # buffers do not travel
         return {k: v for k, v in self.__dict__.items() if k not in ("_packing", "_slopes")}

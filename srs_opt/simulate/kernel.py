@@ -13,8 +13,8 @@ import casadi as ca
 import numpy as np
 
 from srs_opt.simulate import compiled
-from srs_opt.simulate.buffered import Buffered
 from srs_opt.simulate.lanes import step_source
+from srs_opt.simulate.zero_copy import ZeroCopy
 
 LANES = 4  # gaits per call: a vector register of doubles on most machines, two on the others
 _FLAGS = ("-O1", "-fPIC", "-shared", "-fno-math-errno", "-ffp-contract=off", "-w")
@@ -48,7 +48,7 @@ class Kernel:
         self._nx, self._segments, self._np = sizes
         path = compiled.shared_library(key, build, lambda f, name: step_source(f, name, LANES), _flags())
         self._run = _loaded(path)
-        self._slow = Buffered(build()) if self._run is None else None
+        self._slow = ZeroCopy(build()) if self._run is None else None
 
     def run(self, courses: Sequence[Course], *, keep: bool = True) -> tuple[np.ndarray, np.ndarray]:
         """Take every course through its own steps.
@@ -89,7 +89,7 @@ def _loaded(path: Path | None) -> Callable[..., None] | None:
 
 
 def _interpreted(
-    step: Buffered, nx: int, courses: Sequence[Course], keep: bool
+    step: ZeroCopy, nx: int, courses: Sequence[Course], keep: bool
 ) -> tuple[np.ndarray, np.ndarray]:
     n = max(c.h_s.size for c in courses)
     x, error = np.empty((n, nx, len(courses))), np.zeros((n, len(courses)))

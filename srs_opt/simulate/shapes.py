@@ -8,9 +8,9 @@ import numpy as np
 
 from srs_opt.model.outline import centre_line_function
 from srs_opt.model.parameters import Structure
-from srs_opt.simulate.buffered import Buffered
 from srs_opt.simulate.compiled import compiled
 from srs_opt.simulate.integrate import Integrator
+from srs_opt.simulate.zero_copy import ZeroCopy
 
 BATCH = 48  # shapes per call of compiled code
 
@@ -38,6 +38,6 @@ def centre_lines(run: Integrator, kappa: np.ndarray) -> np.ndarray:
 
 
 @lru_cache(maxsize=16)
-def _batch(structure: Structure) -> Buffered:
+def _batch(structure: Structure) -> ZeroCopy:
     key = f"centre lines {BATCH} {structure}"
-    return Buffered(compiled(key, lambda: centre_line_function(structure, BATCH)))
+    return ZeroCopy(compiled(key, lambda: centre_line_function(structure, BATCH)))

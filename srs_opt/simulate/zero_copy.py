@@ -11,7 +11,7 @@ import numpy as np
 _building = threading.RLock()  # symbolic work and buffers are made by one thread at a time
 
 
-class Buffered(threading.local):
+class ZeroCopy(threading.local):
     """A function with its own argument and result arrays, separate ones in every thread.
 
     Arrays are (columns, rows): a CasADi matrix of shape (rows, columns) read in C order. Write into
@@ -44,6 +44,6 @@ def _dense(function: ca.Function) -> ca.Function:
 
 
 @lru_cache(maxsize=64)
-def buffered(function: ca.Function) -> Buffered:
-    """Return the buffered form of a function."""
-    return Buffered(function)
+def zero_copy(function: ca.Function) -> ZeroCopy:
+    """Return the function with arrays that it reads and writes in place."""
+    return ZeroCopy(function)
