@@ -150,9 +150,9 @@ class Robot:
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
     def __reduce__(self) -> tuple[Any, ...]:  # read-only effects do not pickle; worker processes need robots
-        from srs_opt.model.effects import own
+        from srs_opt.model.effects import plugins
 
-        return _restored, (self.to_record(), own.exported())
+        return _restored, (self.to_record(), plugins.exported())
 
     def __hash__(self) -> int:
         return hash(json.dumps(self.to_record(), sort_keys=True))
@@ -178,9 +178,9 @@ def _plain(value: Any) -> Any:
 def _restored(record: dict[str, Any], own_effects: bytes | None = None) -> Robot:
     """Rebuild a robot that another process sent, with the effects of one's own that are known there."""
     if own_effects is not None:
-        from srs_opt.model.effects import own
+        from srs_opt.model.effects import plugins
 
-        own.adopt(own_effects)
+        plugins.adopt(own_effects)
     record["plugins"] = tuple(record["plugins"])
     record["effects"] = tuple(MappingProxyType(spec) for spec in record["effects"])
     return Robot(**record)

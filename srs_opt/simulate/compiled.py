@@ -28,7 +28,7 @@ from pathlib import Path
 import casadi as ca
 
 from srs_opt.errors import InputError
-from srs_opt.model.effects.own import registered
+from srs_opt.model.effects.plugins import registered
 
 FLAGS = ("-O1", "-fPIC", "-shared", "-fno-math-errno")
 

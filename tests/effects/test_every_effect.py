@@ -34,14 +34,14 @@ GAIT = Conditions(50.0, 2.0)
 
 @pytest.fixture(scope="module", autouse=True)
 def plugin(tmp_path_factory):
-    before = dict(own._own)
+    before = dict(plugins._own)
     file = tmp_path_factory.mktemp("plugin") / "mud_plugin.py"
     file.write_text(PLUGIN)
     load_plugin(file)
     assert all_effects()[OWN].kind == "ground"
     yield
-    own._own.clear()
-    own._own.update(before)
+    plugins._own.clear()
+    plugins._own.update(before)
 
 
 def entry_of(name, share=1.0):

@@ -45,7 +45,7 @@ LAYERS = (
 ALLOWED = {
     ("srs_opt.robot", "srs_opt.model.effects"),
     ("srs_opt.robot", "srs_opt.model.effects.entries"),
-    ("srs_opt.robot", "srs_opt.model.effects.own"),
+    ("srs_opt.robot", "srs_opt.model.effects.plugins"),
 }
 LONGEST_FILE = 400
 

@@ -10,7 +10,7 @@ import pytest
 
 from srs_opt.errors import InputError
 from srs_opt.gait import published_wave
-from srs_opt.model.effects import own, register_effect
+from srs_opt.model.effects import plugins, register_effect
 from srs_opt.model.effects.effect import Effect
 from srs_opt.model.effects.parameter import EffectParameter, link
 from srs_opt.orbit.steady import steady_gait

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 def all_effects() -> Mapping[str, Effect]:
     """Return every known effect by name, ordered by what it acts on, then by name; own ones last."""
-    from srs_opt.model.effects.own import registered
+    from srs_opt.model.effects.plugins import registered
 
     own = registered()
     return _together(tuple((name, entry.definition) for name, entry in own.items()))
@@ -31,7 +31,7 @@ def generic_effects() -> Mapping[str, Effect]:
 
 def known_effects() -> Mapping[str, Effect]:
     """Return everything that a robot file may name: all effects, then those that only describe."""
-    from srs_opt.model.effects.own import registered
+    from srs_opt.model.effects.plugins import registered
 
     return _all_known(tuple((name, entry.definition) for name, entry in registered().items()))
 
@@ -43,7 +43,7 @@ def _all_known(own: tuple[tuple[str, str], ...]) -> Mapping[str, Effect]:
 
 @lru_cache(maxsize=4)
 def _together(own: tuple[tuple[str, str], ...]) -> Mapping[str, Effect]:
-    from srs_opt.model.effects.own import registered
+    from srs_opt.model.effects.plugins import registered
 
     known = registered()
     return MappingProxyType({**built_in(), **{name: known[name].effect for name, _ in own}})
@@ -78,22 +78,22 @@ def register_effect(effect: Effect) -> Effect:
     InputError
         If the name is taken, is no plain word, the first parameter is not a size, or there is no hook.
     """
-    from srs_opt.model.effects import own
+    from srs_opt.model.effects import plugins
 
-    own.add(effect, {*built_in(), *generic_effects()})
+    plugins.add(effect, {*built_in(), *generic_effects()})
     return effect
 
 
 def own_definitions(names: list[str]) -> dict[str, str]:
     """Return a hash of the definition of each registered effect among `names` (none of built-in ones)."""
-    from srs_opt.model.effects.own import registered
+    from srs_opt.model.effects.plugins import registered
 
     return {name: own.definition for name, own in registered().items() if name in names}
 
 
 def needed_plugins(names: list[str]) -> list[str]:
     """Return the plugins that define the effects among `names` (none for built-in ones), in order."""
-    from srs_opt.model.effects.own import registered
+    from srs_opt.model.effects.plugins import registered
 
     origins = [own.origin for name, own in registered().items() if name in names]
     return list(dict.fromkeys(origin for origin in origins if origin))
@@ -101,7 +101,7 @@ def needed_plugins(names: list[str]) -> list[str]:
 
 def known_plugins() -> set[str]:
     """Return the plugins that may be needed and are there: run, installed, or in the running program."""
-    from srs_opt.model.effects.own import registered
+    from srs_opt.model.effects.plugins import registered
     from srs_opt.plugins import loaded
 
     return {*loaded(), *(own.origin for own in registered().values() if own.origin)}
