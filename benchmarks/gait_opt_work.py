@@ -54,7 +54,7 @@ def run(quick: bool) -> Section:
         lost.append(1 - found.certificate.speed_m_s / again.certificate.speed_m_s)
         rows += [_row(f"warm, {name}", found, seconds, shares[-1]), _row("  the same cold", again, again_s)]
     notes = [
-        "Warm: from the earlier result alone, one limit moved (no request but speed unless told). Certified "
+        "Warm: from the earlier result alone, one limit moved (nothing but speed unless told). Certified "
         f"speeds. A warm repeat takes {np.median(shares):.2f} of the same search cold in the median "
         f"({min(shares):.2f} to {max(shares):.2f}); the most speed that one lost is {100 * max(lost):.2f} %."
     ]

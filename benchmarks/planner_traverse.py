@@ -44,7 +44,7 @@ OWN = "its own"
 STRAIGHT_RAD_S = 0.02
 LIMIT_NODES, LIMIT_S = 6000, 60.0
 
-PlanRun = tuple[GaitTable, MotionTable]
+TableMotion = tuple[GaitTable, MotionTable]
 
 
 def own_family(robot: Robot, table: GaitTable) -> GaitTable:
@@ -64,7 +64,7 @@ def maze_named(name: str, size: RobotSize) -> Maze:
     return load_maze(f"mazes/{name}.yaml")
 
 
-def duration(robot: Robot, run: PlanRun, maze: Maze, width: int | None) -> float | None:
+def duration(robot: Robot, run: TableMotion, maze: Maze, width: int | None) -> float | None:
     """Return the traverse time of the first certified plan, s; None without one."""
     problem = Problem(robot, *run, maze, MARGIN_M)
     beams = BEAMS if width is None else (replace(BEAM, width=width),)

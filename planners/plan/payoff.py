@@ -59,8 +59,8 @@ class PlanRun:
         """Return one side of the `maze` entry of the command's JSON."""
         return {
             "planned_s": round(self.plan.duration_s, 3),
-            "blind_end_away_m": round(self.away_m, 5),
-            "blind_clearance_m": round(self.open_loop.clearance_m, 5),
+            "open_loop_end_away_m": round(self.away_m, 5),
+            "open_loop_clearance_m": round(self.open_loop.clearance_m, 5),
             "driven": self.driven.to_record(),
         }
 

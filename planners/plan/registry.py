@@ -189,6 +189,6 @@ def _route(kind: str, method: str, problem: Problem, effort: Effort) -> Sequence
 
 
 def _ompl_names() -> str:
-    """Return what OMPL expansions, in words."""
+    """Return what OMPL offers, in words."""
     routes = [name for name in ompl_classes("geometric") if name not in UNUSABLE]
     return f"{', '.join(ompl_classes('control'))}, or dubins- or rs- and one of {', '.join(routes)}"

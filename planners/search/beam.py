@@ -100,8 +100,8 @@ class BeamSearch:
         """Drive the beam on over about `expansions` states; return the way to the goal when it has ended."""
         last = self.expanded + expansions
         while self._front and self.expanded < last:
-            expansions = sorted(expansion for node in self._front for expansion in self._expansions(node))
-            self._front = self._chosen(expansions)
+            ranked = sorted(e for node in self._front for e in self._expansions(node))
+            self._front = self._chosen(ranked)
             nearest = self._to_go_s(self._front)
             self._stalled = 0 if nearest < self._nearest else self._stalled + 1
             self._nearest = min(nearest, self._nearest)

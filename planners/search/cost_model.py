@@ -18,7 +18,7 @@ from srs_opt.robot import Robot
 
 Array = NDArray[np.float64]
 Cost = Literal["time", "length", "clearance", "air"]
-COSTS: tuple[Cost, ...] = get_args(Price)
+COSTS: tuple[Cost, ...] = get_args(Cost)
 TIME_COUNTS = 0.3  # of a second per second where time is not the cost: dawdling is never free
 NEAR_WIDTHS, NEAR_FACTOR = 2.0, 3.0  # within so many body widths of air, up to so much dearer
 DEARER = 1.3  # than the cheapest gait, straight and steady, is a metre of way as a rule

@@ -26,8 +26,8 @@ Array = NDArray[np.float64]
 VERSION = 2  # of motion.json
 STAIR_S = 0.005  # of a changing pressure
 ROW_STEPS = 10  # steps from one look at the body to the next
-# How far the engine may be from our motion when it plays open loop, over the way until then: small differences of
-# speed and turn rate add up.
+# How far the engine, open loop, may be from our motion, over the distance travelled until then: small
+# differences of speed and turn rate add up.
 DRIFT_SHARE = 0.03
 LEAST_DRIFT_M = 0.01
 

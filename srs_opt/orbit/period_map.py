@@ -74,7 +74,7 @@ def plain_period_map(
 def _varied(
     run: Integrator, x: np.ndarray, mesh: Mesh, valve: np.ndarray, p: np.ndarray, hair: np.ndarray
 ) -> PeriodMap:
-    """Return the period map with the derivative from integrations whose starts differ by a hair in one entry each.
+    """Return the period map, its derivative by finite differences of the start.
 
     On a mesh that is kept the integration is a smooth function of its start, and several starts share each
     call of the compiled step: a third of what tangents cost, and no further code to compile.

@@ -265,7 +265,7 @@ def _closed(
 def _newton(
     cycle: Cycle, dynamic: np.ndarray, mesh: Mesh, goal_m_s: float
 ) -> Search[tuple[np.ndarray, PeriodMap, int]]:
-    """Return the dynamic states, the period map there, and how many steps it took; settles where Newton stalls."""
+    """Return dynamic states, the period map there and the number of steps; settles where Newton stalls."""
     mapped = yield from cycle.period_map(dynamic, mesh)
     count = 0
     while (size := cycle.size(mapped.dynamic - dynamic)) > goal_m_s and count < _NEWTON_STEPS:

@@ -1,6 +1,6 @@
-"""Stretches of integration for several searches at once.
+"""Integrations for several searches at once.
 
-A search is a generator: it yields the stretch it wants to see integrated and is sent what came of it. So
+A search is a generator: it yields a request for an integration and is sent its result. So
 many searches, each with its own gait, robot and mesh, share the lanes of a compiled kernel without knowing
 of each other.
 """
@@ -24,7 +24,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class StepRequest:
-    """A wish: take `kernel` from state `x` (nx,) over `mesh` with `valve` (N-1, phases) held and `p`."""
+    """Take `kernel` from state `x` (nx,) over `mesh` with `valve` (N-1, phases) held and `p`."""
 
     kernel: Kernel
     x: np.ndarray
@@ -52,16 +52,16 @@ def run_batched(searches: Sequence[Search[T]]) -> list[T | NoAnswerError]:
     results: list[T | NoAnswerError] = [NoAnswerError("not searched")] * len(searches)
     waiting: dict[Kernel, list[tuple[int, StepRequest]]] = {}
 
-    def advance(index: int, stretched: StepResult | None) -> None:
+    def advance(index: int, result: StepResult | None) -> None:
         search = searches[index]
         try:
-            wish = next(search) if stretched is None else search.send(stretched)
+            request = next(search) if result is None else search.send(result)
         except StopIteration as done:
             results[index] = done.value
         except NoAnswerError as error:
             results[index] = error
         else:
-            waiting.setdefault(wish.kernel, []).append((index, wish))
+            waiting.setdefault(request.kernel, []).append((index, request))
 
     fresh = deque(range(len(searches)))
     while fresh or waiting:
@@ -75,8 +75,8 @@ def run_batched(searches: Sequence[Search[T]]) -> list[T | NoAnswerError]:
         chosen, rest = queue[-LANES:], queue[:-LANES]
         if rest:
             waiting[kernel] = rest
-        for (index, _), stretched in zip(chosen, _stretched(kernel, [wish for _, wish in chosen])):
-            advance(index, stretched)
+        for (index, _), result in zip(chosen, _results(kernel, [request for _, request in chosen])):
+            advance(index, result)
     return results
 
 
@@ -94,8 +94,8 @@ def run_one(search: Search[T]) -> T:
     return result
 
 
-def _stretched(kernel: Kernel, wishes: Sequence[StepRequest]) -> list[StepResult]:
-    courses = [Course(w.x, w.mesh.h_s, w.valve.T[w.mesh.phase], w.p) for w in wishes]
+def _results(kernel: Kernel, requests: Sequence[StepRequest]) -> list[StepResult]:
+    courses = [Course(w.x, w.mesh.h_s, w.valve.T[w.mesh.phase], w.p) for w in requests]
     states, errors = kernel.run(courses)
-    sizes = [w.mesh.h_s.size for w in wishes]
+    sizes = [w.mesh.h_s.size for w in requests]
     return [StepResult(np.ascontiguousarray(states[:n, :, k].T), errors[:n, k]) for k, n in enumerate(sizes)]

@@ -72,8 +72,8 @@ def test_a_tether_is_named_and_closes_the_gap(tmp_path, capsys):
     runs = said["payoff"]["maze"]
     assert runs["after"]["driven"]["reached"] and runs["after"]["driven"]["collisions"] == 0
     # the plan was made for the robot that plays it; the other one did not know of the hose
-    assert runs["after"]["blind_end_away_m"] < 1e-6 < 0.05 < runs["before"]["blind_end_away_m"]
-    assert runs["after"]["blind_clearance_m"] > 0.0049
+    assert runs["after"]["open_loop_end_away_m"] < 1e-6 < 0.05 < runs["before"]["open_loop_end_away_m"]
+    assert runs["after"]["open_loop_clearance_m"] > 0.0049
     page = (tmp_path / "out" / "report.html").read_text()
     assert page.count("data:image/png") == 5 and "In a maze" in page
     assert said["effects"][0]["look"] in page and "What acts alike on these data" in page

@@ -17,7 +17,7 @@ from srs_opt.calibrate.model import Conditions, Model
 from srs_opt.calibrate.run import calibrate
 from srs_opt.measurement.dataset import load_dataset
 from srs_opt.measurement.records import Trial
-from srs_opt.model.effects import all_effects, built_in, own
+from srs_opt.model.effects import all_effects, built_in, plugins
 from srs_opt.model.effects.effect import HOOKS
 from srs_opt.model.effects.parameter import Component
 from srs_opt.model.parameters import Structure

@@ -7,7 +7,8 @@ from effect_lab import PLUGIN, small_set
 
 from srs_opt.calibrate.__main__ import main as calibrate
 from srs_opt.discrepancy.__main__ import main as discrepancy
-from srs_opt.model.effects import plugins, register_effect
+from srs_opt.model.effects import plugins as effect_plugins
+from srs_opt.model.effects import register_effect
 from srs_opt.model.effects.effect import Effect
 from srs_opt.model.effects.parameter import EffectParameter
 from srs_opt.robot import load_robot, save_robot
@@ -19,7 +20,7 @@ def registry(monkeypatch):
     """Forget what a test registers."""
     from srs_opt import plugins
 
-    monkeypatch.setattr(own, "_own", {})
+    monkeypatch.setattr(effect_plugins, "_own", {})
     monkeypatch.setattr(plugins, "_loaded", {})
 
 

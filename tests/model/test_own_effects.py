@@ -30,7 +30,7 @@ SIZE = (EffectParameter("damping", "N s/m", 0.1, lower=0),)
 @pytest.fixture
 def registry(monkeypatch):
     """Forget what a test registers."""
-    monkeypatch.setattr(own, "_own", {})
+    monkeypatch.setattr(plugins, "_own", {})
     yield
     monkeypatch.undo()
 
@@ -110,7 +110,7 @@ def test_a_changed_definition_is_compiled_anew(tmp_path):
 def test_fingerprint_follows_the_definition(registry, monkeypatch):
     prints = set()
     for factor in (1, 2):
-        monkeypatch.setattr(own, "_own", {})
+        monkeypatch.setattr(plugins, "_own", {})
         hook = {1: lambda e, v: -e["damping"] * v, 2: lambda e, v: -2 * e["damping"] * v}[factor]
         register_effect(Effect("mine", "ground", SIZE, rolling_force=hook))
         prints.add(wpi_srs().with_values(effects=[{"name": "mine", "damping": 0.1}]).fingerprint())
