@@ -5,9 +5,12 @@ from __future__ import annotations
 import argparse
 import importlib
 import json
+import math
 import os
+import random
 import shutil
 import sys
+import time
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
@@ -39,6 +42,8 @@ def study_parser(name: str, description: str | None, sets: int) -> argparse.Argu
     add("--cluster", metavar="ADDRESS", help="Dask scheduler to send the work to, host:port")
     add("--rows", type=Path, default=STORED / f"{name}.jsonl", metavar="FILE",
         help="the rows, one JSON each; the default is what the report shows")  # fmt: skip
+    add("--minutes", type=float, default=math.inf, metavar="M",
+        help="stop after M minutes and store what is done: a random sample of the sets")  # fmt: skip
     return parser
 
 
@@ -51,17 +56,30 @@ def gather(
 ) -> list[Row]:
     """Return ``work(*item)`` of all items and keep the rows; when interrupted, the next call goes on.
 
-    Rows found before the interruption count only if no source has changed since, nor `depends`, which
-    stands for files that the work reads.
+    The items are visited in random order, so that what is done when the time of `options.minutes` is over is
+    a sample of all kinds of them; the first line of the rows then says how many there are. Rows found before
+    an interruption count only if no source has changed since, nor `depends`, which stands for files that the
+    work reads.
     """
     key = " ".join([name, depends, *(source_digest(HERE.parent / package) for package in PACKAGES)])
     unfinished = options.rows.with_suffix(".unfinished")
     each, kept = partial(_each, _importable(work)), Resume(unfinished, key)
+    order = random.Random(options.seed).sample(range(len(items)), len(items))
+    end, found = time.monotonic() + 60 * options.minutes, {}
     with executor(options.jobs, options.cluster) as where:
-        rows = list(sweep(each, items, chunk=1, where=where, what=name, quiet=False, resume=kept))
-    lines = [{"measured": machine(), "seed": options.seed}, *rows]
+        swept = sweep(
+            each, [items[k] for k in order], chunk=1, where=where, what=name, quiet=False, resume=kept
+        )
+        for k, row in zip(order, swept):
+            found[k] = row
+            if time.monotonic() > end:
+                break
+    rows = [found[k] for k in sorted(found)]
+    short = "" if len(rows) == len(items) else f"; {len(rows)} of {len(items)} sets, drawn at random"
+    lines = [{"measured": machine() + short, "seed": options.seed}, *rows]
     write_text(options.rows, "".join(json.dumps(line) + "\n" for line in lines))
-    shutil.rmtree(unfinished, ignore_errors=True)
+    if not short:
+        shutil.rmtree(unfinished, ignore_errors=True)
     return rows
 
 

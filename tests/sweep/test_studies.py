@@ -1,6 +1,5 @@
 """Long studies keep their rows, go on after an interruption, and drop rows that other sources made."""
 
-import argparse
 import json
 import sys
 from functools import partial
@@ -13,17 +12,19 @@ from benchmarks import stored
 
 
 def squared(log, k):
-    """One row; the log counts how often it was worked out. Item 3 is interrupted while `stop` exists."""
-    if k == 3 and (Path(log).parent / "stop").exists():
+    """One row; the log counts how often it was worked out. The fourth is interrupted while `stop` exists."""
+    log = Path(log)
+    if (log.parent / "stop").exists() and log.exists() and len(log.read_text()) == 3:
         raise KeyboardInterrupt
-    with Path(log).open("a") as stream:
+    with log.open("a") as stream:
         stream.write("x")
     return {"k": k, "square": k * k}
 
 
 @pytest.fixture
 def options(tmp_path):
-    return argparse.Namespace(rows=tmp_path / "study.jsonl", jobs=1, cluster=None, seed=7)
+    given = ["--rows", str(tmp_path / "study.jsonl"), "--jobs", "1", "--seed", "7"]
+    return stored.study_parser("study", "", 5).parse_args(given)
 
 
 def interrupted(tmp_path, options, depends):
@@ -47,6 +48,19 @@ def test_a_study_goes_on_where_it_was(tmp_path, options, depends, worked):
     assert kept == rows
     assert first["seed"] == 7
     assert sorted(file.name for file in tmp_path.iterdir()) == ["log", "study.jsonl"]
+
+
+def test_a_study_cut_short_stores_a_sample_and_says_so(tmp_path, options):
+    options.minutes = 0.0
+    work, items = partial(squared, tmp_path / "log"), [(k,) for k in range(50)]
+    rows = stored.gather("study", work, items, options)
+    first, *kept = map(json.loads, options.rows.read_text().splitlines())
+    assert len(rows) == 1
+    assert kept == rows
+    assert "1 of 50 sets, drawn at random" in first["measured"]
+    options.minutes = 10.0  # the next call goes on
+    assert [row["k"] for row in stored.gather("study", work, items, options)] == list(range(50))
+    assert len((tmp_path / "log").read_text()) == 50
 
 
 def test_rows_of_an_older_planner_are_not_mixed_in(tmp_path, options, monkeypatch):
