@@ -53,6 +53,8 @@ def _forward(found: Discrepancy) -> list[str]:
     deviance = _deviance(total, chosen)
     for _ in range(5):
         free = [k for k in range(lin.fitted, size) if k not in chosen]
+        if not free:
+            break
         trials = [(_deviance(total, [*chosen, k]), k) for k in free]
         best, k = min(trials)
         if deviance - best < 2:

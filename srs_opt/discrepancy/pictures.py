@@ -22,7 +22,7 @@ AFTER, BEFORE = COLOURS[:2]
 @styled
 def pictures(found: Discrepancy) -> list[Picture]:
     """Return the pictures that the result allows."""
-    if found.null is None or found.best is None or found.experiment is None or found.selection is None:
+    if found.null is None or found.best is None or found.shown_in is None or found.selection is None:
         return []
     drawn = [_candidates(found), _trials(found)]
     return [_sealed(found), *drawn] if found.split.sealed else drawn
@@ -45,14 +45,14 @@ def gap_picture(found: Discrepancy) -> Picture | None:
 @styled
 def gap_figure(found: Discrepancy) -> Figure | None:
     """Return the figure of the gap that closes, where an effect closes one on sealed trials."""
-    if found.experiment is None or found.null is None or found.selection is None or found.gap is None:
+    if found.shown_in is None or found.null is None or found.selection is None or found.gap is None:
         return None
     trials = [t for t in found.split.sealed if t.name in found.gap.before.by_trial]
     if not trials or not found.selection.best.candidates:
         return None
     trial = max(trials, key=lambda t: found.gap.before.by_trial[t.name])  # type: ignore[union-attr]
     fits = [found.null.hypothesis.fit, found.selection.best.fit]
-    residuals = [sealed_residuals(found.experiment, f, [trial])[0] for f in fits]
+    residuals = [sealed_residuals(found.shown_in, f, [trial])[0] for f in fits]
     track = np.asarray(track_of(trial))
     figure = _figure(PAGE_IN, 2.9)
     room, course = figure.subplots(1, 2, width_ratios=(1.0, 1.2))
@@ -93,7 +93,7 @@ def _figure(width: float, height: float) -> Figure:
 
 def _sealed(found: Discrepancy) -> Picture:
     """Draw the smoothed residual over time on the sealed trials, before and after."""
-    assert found.experiment is not None and found.null is not None and found.selection is not None
+    assert found.shown_in is not None and found.null is not None and found.selection is not None
     trials = sorted(found.split.sealed[:4], key=lambda trial: trial.name)
     fits = [found.null.hypothesis.fit, found.selection.best.fit]
     figure = _figure(PAGE_IN, 0.9 + 1.2 * len(trials))
@@ -102,7 +102,7 @@ def _sealed(found: Discrepancy) -> Picture:
     colours = (BEFORE, AFTER)
     shown = 2 if found.selection.best.candidates else 1
     for fit, label, colour in list(zip(fits, labels, colours))[:shown]:
-        for axis, trial, residual in zip(axes, trials, sealed_residuals(found.experiment, fit, trials)):
+        for axis, trial, residual in zip(axes, trials, sealed_residuals(found.shown_in, fit, trials)):
             axis.plot(trial.time_s, 1e3 * _rolling(residual), color=colour, label=label, lw=1.3)
             axis.set_ylabel(f"{trial.name}\n(mm)")
     for axis in axes:

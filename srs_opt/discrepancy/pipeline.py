@@ -102,6 +102,12 @@ class Discrepancy(Result):
         return self.verdict.word in BELIEVED
 
     @property
+    def shown_in(self) -> Experiment | None:
+        """In which the best can be simulated: a described gap's knows the term, not the listed effects."""
+        term = self.description.experiment if self.verdict.word == DESCRIBED and self.description else None
+        return term or self.experiment
+
+    @property
     def answer(self) -> Hypothesis | None:
         """The best set of effects, or the term that describes the gap."""
         return self.selection.best if self.selection else None
@@ -239,7 +245,7 @@ def _examine(
             following = repeat_of(worst, null.linearisation.equations, "something that the model lacks")
     if verdict.word == DESCRIBED and description is not None and description.diagnostics is not None:
         best = description.diagnostics  # what the report shows, in a model that knows the term
-        selection, experiment = Selection(best.hypothesis, (), {}), description.experiment or experiment
+        selection = Selection(best.hypothesis, (), {})
     return Discrepancy(
         dataset,
         verdict,

@@ -6,15 +6,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from benchmarks.discrepancy_baselines import baselines
 from srs_opt.calibrate.candidates import Candidate, fitted_coordinates
 from srs_opt.calibrate.experiment import Experiment
 from srs_opt.calibrate.forms import Form
 from srs_opt.calibrate.model import Model
 from srs_opt.calibrate.noise import noise_of
-from srs_opt.discrepancy import describe
+from srs_opt.discrepancy import describe, pipeline
 from srs_opt.discrepancy.__main__ import main
 from srs_opt.discrepancy.describe import describe_gap, terms_of
 from srs_opt.discrepancy.locate import stages
+from srs_opt.discrepancy.pipeline import diagnose
 from srs_opt.discrepancy.search import Search
 from srs_opt.discrepancy.split import split_trials
 from srs_opt.measurement.dataset import load_dataset
@@ -54,6 +56,8 @@ def test_a_wheel_that_rolls_hard_is_described_by_the_command(tmp_path, few_terms
     listed = (Candidate(Form(all_effects()["head_mass"])),)
     monkeypatch.setattr("srs_opt.discrepancy.pipeline._candidates", lambda *_: listed)
     lab_set(tmp_path / "set", ({"name": "stiff_wheel", "excess": 5.0, "link": 2},))
+    found = []
+    monkeypatch.setattr(pipeline, "diagnose", lambda *a, **k: found.append(diagnose(*a, **k)) or found[0])
     out = tmp_path / "out"
     assert main([str(tmp_path / "set"), "--quiet", "--jobs", "1", "--out", str(out)]) == 0
     said = json.loads((out / "discrepancy.json").read_text(encoding="utf-8"))
@@ -67,6 +71,8 @@ def test_a_wheel_that_rolls_hard_is_described_by_the_command(tmp_path, few_terms
     robot = load_robot(out / "described_robot.yaml")
     assert robot.effects[0]["excess"] == pytest.approx(effect["parameters"]["excess"])
     assert "link 2 rolls" in (out / "report.html").read_text(encoding="utf-8")
+    said = baselines(found[0])  # what simpler methods say of the same set, with the listed effects
+    assert set(said) == {"nearest_shape", "forward_aic", "sparse_regression"}
 
 
 def test_nothing_is_described_where_nothing_is_missing(tmp_path, few_terms):
