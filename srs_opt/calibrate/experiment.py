@@ -19,7 +19,7 @@ from srs_opt.errors import NoAnswerError
 from srs_opt.measurement.records import Bench, Trial
 from srs_opt.parallel import HERE, Executor
 
-MOST_KEPT = 2_000_000  # measured values up to which slopes and motions are kept: some 300 MB
+MOST_KEPT = 1_200_000  # measured values up to which slopes and motions are kept: some 300 MB
 
 
 class Experiment:
@@ -114,7 +114,7 @@ class Experiment:
         NoAnswerError
             If a trial cannot be simulated there.
         """
-        stale = stale and self.keeps and extra is None
+        stale = stale and self.keeps
         request = Request(point, tuple(coordinates), extra, stale, rough, self.noise)
         found: dict[str, NormalEquations] = self._ask(self.trials if trials is None else trials, request)
         if self.readings and found:

@@ -6,7 +6,7 @@ so the answers are the same to the last bit whoever simulates which trials.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 
@@ -29,9 +29,7 @@ from srs_opt.simulate.batched import run_batched
 AT_ONCE = 48  # trials whose motions are in memory together: enough to fill the lanes
 ROUGHER = 5.0  # times the tolerance, for fits whose misfit hides it
 Extra = Callable[[Trial, Prediction], np.ndarray]
-Slopes = tuple[tuple[str, ...], np.ndarray]  # coordinates, and a trial's slopes (n, K) in single precision
 Place = tuple[bool, dict[str, float]]  # where a trial was simulated: roughly or not, the values
-Memory = tuple[Meshes, Place | None, Slopes | None]
 Answer = NormalEquations | np.ndarray | NoAnswerError
 
 
@@ -71,7 +69,8 @@ class Request:
     extra : callable, optional
         Residual functions, as further columns.
     stale : bool
-        Whether slopes of the last request for the same coordinates serve.
+        Whether slopes of the last request for the same coordinates serve, wherever that was. Those of the
+        same place always do.
     rough : bool
         Whether the motions need not be better than a model can say that leaves a plain misfit.
     noise : Noise, optional
@@ -84,6 +83,27 @@ class Request:
     stale: bool = False
     rough: bool = False
     noise: Noise | None = None
+
+
+@dataclass(frozen=True)
+class Slopes:
+    """A trial's slopes where they were last taken.
+
+    Attributes
+    ----------
+    place : tuple
+    names : tuple of str
+        Coordinates.
+    values : array (n, K)
+        In single precision.
+    """
+
+    place: Place
+    names: tuple[str, ...]
+    values: np.ndarray
+
+
+Memory = tuple[Meshes, Place | None, dict[bool, Slopes]]
 
 
 class Trials:
@@ -108,8 +128,9 @@ class Trials:
         self.runs = {t.name: TrialRun(model, t) for t in trials}
         self._tracks = {t.name: track_of(t) for t in trials}
         self._whitenings: dict[str, tuple[Noise, Whitening]] = {}
-        self._slopes: dict[str, Slopes] = {}
-        self._new_slopes: set[str] = set()
+        # trial -> the last slopes of requests without residual functions, and with them
+        self._slopes: dict[str, dict[bool, Slopes]] = {t.name: {} for t in trials}
+        self._new_slopes: set[tuple[str, bool]] = set()
         self._motions: dict[str, tuple[Place, Nodes]] = {}
         self._last: dict[str, Place] = {}
         self._scatter_sd = np.array(list(SCATTER_SD.values()))
@@ -127,9 +148,18 @@ class Trials:
 
     def memory(self, names: Sequence[str], request: Request | None) -> dict[str, Memory]:
         """Return what the trials go on from: with slopes if `request` uses them, or those that are new."""
-        wanted = self._new_slopes if request is None else set(names if request.stale else ())
+
+        def wanted(name: str, wide: bool, kept: Slopes) -> bool:
+            if request is None:
+                return (name, wide) in self._new_slopes
+            return _serve(kept, request, wide) or kept.place == self._place(name, request)
+
         return {
-            n: (self.runs[n].meshes, self._last.get(n), self._slopes.get(n) if n in wanted else None)
+            n: (
+                self.runs[n].meshes,
+                self._last.get(n),
+                {wide: kept for wide, kept in self._slopes[n].items() if wanted(n, wide, kept)},
+            )
             for n in names
         }
 
@@ -140,8 +170,7 @@ class Trials:
             self._motions.pop(name, None)
             if last is not None:
                 self._last[name] = last
-            if slopes is not None:
-                self._slopes[name] = slopes
+            self._slopes[name] |= slopes
         self._new_slopes = set()
 
     def answer(self, names: Sequence[str], request: Request) -> dict[str, Answer]:
@@ -149,7 +178,7 @@ class Trials:
         found: dict[str, Answer] = {}
         for first in range(0, len(names), AT_ONCE):
             some = names[first : first + AT_ONCE]
-            for name, nodes in self._simulated(some, request.point, rough=request.rough).items():
+            for name, nodes in self._simulated(some, request).items():
                 found[name] = nodes if isinstance(nodes, NoAnswerError) else self._seen(name, nodes, request)
         return found
 
@@ -183,25 +212,26 @@ class Trials:
             found.points(raw.points), found.slopes(raw.slopes), found.pose(raw.pose), raw.kappa, free
         )
 
-    def _simulated(
-        self, names: Sequence[str], point: Point, *, rough: bool
-    ) -> dict[str, Nodes | NoAnswerError]:
-        """Return the trials' motions at `point`.
+    def _place(self, name: str, request: Request) -> Place:
+        default = self.model.default
+        values = {k: v for k, v in request.point.of_trial(name).items() if v != default(k)}
+        return request.rough, values
+
+    def _simulated(self, names: Sequence[str], request: Request) -> dict[str, Nodes | NoAnswerError]:
+        """Return the trials' motions where they are asked for.
 
         One that was simulated there last is not simulated anew; where its motion was not kept, its last
         meshes serve as they are, which gives the same bits.
         """
-        default = self.model.default
-        wanted: dict[str, Place] = {
-            n: (rough, {k: v for k, v in point.of_trial(n).items() if v != default(k)}) for n in names
-        }
+        wanted = {n: self._place(n, request) for n in names}
         known: dict[str, Nodes | NoAnswerError] = {}
         for n in names:
             if n in self._motions and self._motions[n][0] == wanted[n]:
                 known[n] = self._motions[n][1]
-        tolerance = self.tolerance_m_s * (ROUGHER if rough else 1.0)
+        tolerance = self.tolerance_m_s * (ROUGHER if request.rough else 1.0)
         rest = [n for n in names if n not in known]
         attempts = [1 if self._last.get(n) == wanted[n] else ATTEMPTS for n in rest]
+        point = request.point
         searches = [self.runs[n].search(point.of_trial(n), tolerance, a) for n, a in zip(rest, attempts)]
         for name, nodes in zip(rest, run_batched(searches)):
             known[name] = nodes
@@ -220,18 +250,22 @@ class Trials:
             return np.asarray(track - self._predicted(name, nodes, request.point, ()).points)
         point, extra = request.point, request.extra
         names = tuple(c.name for c in request.coordinates)
-        kept = self._slopes.get(name)
-        stale = request.stale and kept is not None and kept[0] == names
-        prediction = self._predicted(name, nodes, point, () if stale else request.coordinates)
-        residual = np.asarray(track - prediction.points)
-        if stale:
+        wide, here = extra is not None, self._place(name, request)
+        kept = self._slopes[name].get(wide)
+        served = kept is not None and kept.place != here and _serve(kept, request, wide)
+        known = {k: v for s in self._slopes[name].values() if s.place == here for k, v in _columns(s)}
+        if served:
             assert kept is not None
-            slopes = kept[1]
-        else:
-            slopes = prediction.slopes.reshape(residual.size, -1)
-            if self.keeps and extra is None:
-                self._slopes[name] = names, slopes.astype(np.float32)
-                self._new_slopes.add(name)
+            known = dict(_columns(kept))
+        missing = [c for c in request.coordinates if c.name not in known]
+        prediction = self._predicted(name, nodes, point, missing)
+        residual = np.asarray(track - prediction.points)
+        new = prediction.slopes.reshape(residual.size, -1)
+        known |= {c.name: new[:, k] for k, c in enumerate(missing)}
+        slopes = np.stack([known[n] for n in names], axis=1)
+        if self.keeps and not served:
+            self._slopes[name][wide] = Slopes(here, names, slopes.astype(np.float32))
+            self._new_slopes.add((name, wide))
         if extra is not None:
             further = extra(self._trials[name], prediction).reshape(residual.size, -1)
             slopes = np.column_stack([slopes, further])
@@ -243,7 +277,7 @@ class Trials:
         normal = trial_normal_equations(
             residual.ravel(), slopes, whiten, scattered, self._scatter_sd, now, own, own_sd
         )
-        return replace(normal, stale=stale)
+        return replace(normal, stale=served)
 
     def _own(
         self, name: str, prediction: Prediction, noise: Noise
@@ -268,6 +302,16 @@ class Trials:
             known = noise, Whitening(noise, self._trials[name].time_s, np.isfinite(track))
             self._whitenings[name] = known
         return known[1]
+
+
+def _serve(kept: Slopes, request: Request, wide: bool) -> bool:
+    """Whether kept slopes serve although they are those of another place."""
+    asked = None if request.coordinates is None else tuple(c.name for c in request.coordinates)
+    return request.stale and wide == (request.extra is not None) and kept.names == asked
+
+
+def _columns(kept: Slopes) -> Iterator[tuple[str, np.ndarray]]:
+    return zip(kept.names, kept.values.T)
 
 
 @lru_cache(maxsize=4)

@@ -88,6 +88,11 @@ class Hypothesis:
                 return f"{name} would lie {abs(off):.1f} standard deviations from its bench value"
         return ""
 
+    def close_to(self, earlier: Hypothesis) -> bool:
+        """Whether the fit lies within what it is known to of an earlier one: slopes hardly differ."""
+        was, now = earlier.fit.point.values, self.fit.point.values
+        return all(abs(now[n] - was[n]) <= sd for n, sd in self.fit.sd.items())
+
     def specs(self) -> list[dict[str, Any]]:
         """Return the effects as entries of a robot file."""
         return [effect_spec(c, self.fit.point.values) for c in self.candidates]

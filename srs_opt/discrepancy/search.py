@@ -15,11 +15,19 @@ from srs_opt.calibrate.fit import FAR_OFF, PLAIN, Fit, start_point
 from srs_opt.calibrate.noise import Noise
 from srs_opt.calibrate.objective import priors, sum_eliminated
 from srs_opt.calibrate.slow import smooth_part
-from srs_opt.discrepancy.alike import Angles
 from srs_opt.discrepancy.detect import detect, project, with_shared
-from srs_opt.discrepancy.diagnostics import TELLING, Diagnostics, explainable, explained, needed_gain
+from srs_opt.discrepancy.diagnostics import Diagnostics, explainable, explained, needed_gain
 from srs_opt.discrepancy.functions import ResidualFunctions
-from srs_opt.discrepancy.hypothesis import ITERATIONS, SMALL, Hypothesis, cost, fit_hypothesis, left_of, stuck
+from srs_opt.discrepancy.hypothesis import (
+    ITERATIONS,
+    SMALL,
+    Hypothesis,
+    cost,
+    fit_hypothesis,
+    left_of,
+    stuck,
+)
+from srs_opt.discrepancy.promising import promising
 from srs_opt.discrepancy.screen import Linearisation, Score, expected_start, screen
 from srs_opt.discrepancy.split import brief_name
 from srs_opt.errors import NoAnswerError
@@ -32,8 +40,6 @@ DEEPEST_BRIEF = 3  # with the first seconds of a few trials
 # probability Phi(-sqrt(D)) at worst, whatever separates the two: under 1 % here, so that the sets that are
 # kept hold the truth at 95 % with several rivals.
 RIVAL = 6.0
-_CONTENDER = 0.45  # share of the best expected gain that earns a refit
-_NEAR = 40.0  # or this little behind it
 _MOST_REFITS = (5, 4, 3, 3)
 QUICK_ITERATIONS = 10  # with the first seconds of a few trials, before all are asked
 # shares of the misfit that fits which do not explain the data may leave to be gained: those, and all others
@@ -43,9 +49,6 @@ HOPELESS = 0.1  # share of the gap that the best known effects leave, from which
 # the same flexibility between 50 and 500 1/(N m^2), a tenth takes twice the iterations
 LEAP = 0.35
 FIRM = 10.0  # standard deviations from zero at which an effect is not superfluous, without a refit
-# angle at which a member of a pair of look-alikes that is well behind in the screen is refitted all the same:
-# far from the linearisation's point an effect does up to sin^2 of it of something else
-KIN_RAD = 0.8
 # deviance behind the best, and number, of sets that are fitted again when the noise turns out another
 REFITTED, MOST_REFITTED = 60.0, 5
 Report = Callable[[str], None]
@@ -169,10 +172,13 @@ class Search:
         """Return a hypothesis under the noise assumed by now."""
         return self.fit(hypothesis.candidates, hypothesis.fit.point) or hypothesis
 
-    def examine(self, hypothesis: Hypothesis) -> Diagnostics:
-        """Linearise about a fitted hypothesis, test what is left and screen what could explain it."""
+    def examine(self, hypothesis: Hypothesis, *, stale: bool = False) -> Diagnostics:
+        """Linearise about a fitted hypothesis, test what is left and screen what could explain it.
+
+        With `stale` the slopes of the last examination serve, if it was of the same effects.
+        """
         fit = hypothesis.fit
-        lin = self._linearise(fit)
+        lin = self._linearise(fit, stale=stale)
         groups = self.functions.groups()
         size, columns = len(lin.coordinates), next(iter(lin.equations.values())).raw.shape[0] - 1
         total = sum_eliminated(lin.equations, 1.0)
@@ -197,7 +203,10 @@ class Search:
             return diagnostics
         amplitudes = self.functions.amplitudes(self.trials, len(lin.coordinates))
         noise = smooth_part(now, lin.equations, amplitudes, lin.coordinates, lin.point)
-        return diagnostics if noise == now else self.examine(self._under(noise, diagnostics.hypothesis))
+        if noise == now:
+            return diagnostics
+        found = self._under(noise, diagnostics.hypothesis)
+        return self.examine(found, stale=found.close_to(diagnostics.hypothesis))
 
     def _with_rivals(self) -> list[Hypothesis]:
         """Return what was fitted, and the best that were fitted under another noise fitted anew."""
@@ -206,14 +215,14 @@ class Search:
             self.again(h)
         return self.fitted
 
-    def _linearise(self, fit: Fit) -> Linearisation:
+    def _linearise(self, fit: Fit, *, stale: bool) -> Linearisation:
         names = {c.name for c in fit.coordinates}
         others = [c for k in self.candidates for c in k.sizes if c.name not in names]
         coordinates = (*fit.coordinates, *others)
         point = Point({**{c.name: 0.0 for c in others}, **fit.point.values}, fit.point.scatter)
         rough = fit.variance_inflation > PLAIN
         equations = self.experiment.normal_equations(
-            point, coordinates, self.trials, self.functions, rough=rough
+            point, coordinates, self.trials, self.functions, rough=rough, stale=stale
         )
         return Linearisation(coordinates, len(fit.coordinates), point, equations, fit.variance_inflation)
 
@@ -228,7 +237,9 @@ class Search:
             depth = len(current.hypothesis.candidates)
             if depth >= self.deepest:
                 break
-            better = self._refit(current, self._proposals(current, depth), _MOST_REFITS[depth])
+            better = self._refit(
+                current, promising(current, depth, len(self.candidates)), _MOST_REFITS[depth]
+            )
             better = self._swapped(current, better)
             if better is None or not self._worth(better, current.hypothesis):
                 break
@@ -315,29 +326,6 @@ class Search:
         key = frozenset(c.label for c in hypothesis.candidates), True
         tried = self._fits.get(key) or self.try_out(hypothesis.candidates, hypothesis.fit.point)
         return math.inf if tried is None else cost(tried)
-
-    def _proposals(self, current: Diagnostics, depth: int) -> list[Score]:
-        """Return the candidates that deserve a refit, best first."""
-        inflation = current.hypothesis.fit.variance_inflation
-        scores = [s for s in current.scores if self.significant(s) or s.improvement * inflation > 60]
-        if inflation < FAR_OFF:  # expected sizes can be believed
-            scores = [s for s in scores if s.relative_size >= TELLING]
-        far = inflation > 1  # nearer, a little bending's slopes hold as all others do
-        leaps = [s for s in current.scores if far and s.candidate.form.effect.bends]
-        scores = [s for s in scores if s not in leaps]
-        if not scores:
-            return leaps
-        best = scores[0].improvement
-        limit = min(_CONTENDER * best, max(best - _NEAR, 0.25 * best))
-        chosen = [s for s in scores if s.improvement >= limit]
-        if depth == 0:
-            angles = Angles(current.linearisation)
-            for s in scores:
-                if s not in chosen and s.improvement > 0.2 * best:
-                    angle = angles.between(scores[0].candidate, s.candidate)
-                    if angle is not None and angle < KIN_RAD:
-                        chosen.append(s)
-        return [*leaps, *chosen]
 
     def _refit(self, current: Diagnostics, proposals: list[Score], most: int) -> Hypothesis | None:
         """Refit proposals on the start of a few trials, best first; return the best fit to all of them."""

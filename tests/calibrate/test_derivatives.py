@@ -8,6 +8,7 @@ from srs_opt.calibrate.coordinates import base_coordinates
 from srs_opt.calibrate.experiment import Experiment, Point
 from srs_opt.calibrate.fit import start_point
 from srs_opt.calibrate.model import Model
+from srs_opt.calibrate.trials import Request
 from srs_opt.measurement.records import Trial
 from srs_opt.robot import wpi_srs
 
@@ -77,3 +78,28 @@ def test_a_dead_time_is_a_late_clock(setting):
     delayed = experiment.predict("t", Point({**plain, "dead_time.delay_s": 0.03}), (), FINE_M_S).points
     shifted = experiment.predict("t", Point({**plain, "clock_offset.offset_s": -0.03}), (), FINE_M_S).points
     assert np.abs(delayed - shifted).max() < 1e-6
+
+
+def test_slopes_of_the_same_place_serve_again_whoever_is_asked(setting, monkeypatch):
+    """A place is simulated and derived once; a worker that is handed the memory gives the same bits."""
+    robot, coordinates = wpi_srs(), setting[2]
+    base = base_coordinates(robot)
+    blank = np.zeros((60, robot.links, 2))
+    trial = Trial("t", 1.5, 48.0, 0.4, np.pi / 2, 0.7, 0.6, np.arange(60) / 100, markers_m=blank)
+    work = Experiment(Model(robot), [trial], 0.001).work
+    here, there = start_point(base), Point({**start_point(base).values, "tau1_s": 0.01})
+    first = work.answer(["t"], Request(here, base))["t"]
+    wider = Request(here, (*base, *coordinates[len(base) : len(base) + 2]))
+    part = work.part(["t"])
+    part.remember(work.memory(["t"], wider))
+    elsewhere = part.answer(["t"], wider)["t"]
+    wide = work.answer(["t"], wider)["t"]
+    assert np.array_equal(wide.raw, elsewhere.raw) and not wide.stale
+    kept = [*range(len(base)), -1]
+    assert np.allclose(
+        wide.raw[np.ix_(kept, kept)], first.raw, rtol=1e-5, atol=1e-6 * np.abs(first.raw).max()
+    )
+
+    monkeypatch.setattr("srs_opt.calibrate.observe.variation", None)  # not needed any more
+    assert not work.answer(["t"], wider)["t"].stale
+    assert work.answer(["t"], Request(there, wider.coordinates, stale=True))["t"].stale
