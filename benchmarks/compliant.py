@@ -34,8 +34,8 @@ def run(quick: bool) -> Section:
             robot = soft(stiffness).with_values(friction_speed_m_s=0.002)
             integrator, timeline = Integrator(robot), Timeline.of_gait(gait, duration)
             rest = integrator.rest()
-            integrator.run(timeline, rest)
-            seconds = best_time(lambda: integrator.run(timeline, rest), tries)  # noqa: B023
+            integrator.integrate(timeline, rest)
+            seconds = best_time(lambda: integrator.integrate(timeline, rest), tries)  # noqa: B023
             over = seconds / rigid.setdefault(label, seconds)
             row += [f"{500 / duration * seconds:.2f}", f"{over:.2f}"]
             if stiffness == 0.005:

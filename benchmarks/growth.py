@@ -71,7 +71,7 @@ def _links(sizes: list[int]) -> dict[str, Curve]:
         # two waves of moderate bend along any body
         gait = Wave.uniform(links - 1, 1.5, 40.0, 2 * math.pi / (links - 1)).gait()
         timeline = Timeline.of_gait(gait, 2.0)
-        period.append(best_time(lambda: run.run(timeline, run.rest()), 3))  # noqa: B023
+        period.append(best_time(lambda: run.integrate(timeline, run.rest()), 3))  # noqa: B023
         gait_s.append(best_time(lambda: steady_gaits(robot, [gait] * 4), 2) / 4)  # noqa: B023
     n = [float(s) for s in sizes]
     curves = {"2 s of motion": (n, period), "a steady gait": (n, gait_s)}

@@ -88,7 +88,7 @@ class VirtualPilot:
         track, problem = self.world.track, self.arena.problem
         pose = np.array([[*places.mean(axis=0), heading.mean()] for _, places, heading, _ in track])
         kappa = np.array([kappa for *_, kappa in track])
-        return float(clearances(problem, body_in_room(centre_lines(problem.run, kappa), pose)).min())
+        return float(clearances(problem, body_in_room(centre_lines(problem.integrator, kappa), pose)).min())
 
 
 def virtual_pilot(

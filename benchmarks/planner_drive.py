@@ -64,7 +64,7 @@ def open_loop_m(problem: Problem, plan: Plan, robot: Robot) -> float:
     run, root = Integrator(robot, problem.gaits.model), at_rest(problem)
     state, before = root.state, root.gait
     for gait in plan.gaits:
-        state = run.run(problem.joints.timeline(before, gait), state).final
+        state = run.integrate(problem.joints.timeline(before, gait), state).final
         before = gait
     return max(0.0, float(problem.goal.distance(state[:2])))
 

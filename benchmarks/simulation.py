@@ -50,7 +50,7 @@ def _ours(
     reference = _motion(run, tight, gait.period_s, 1e-9)
     tries = 5 if quick else 3
     floor, floor_motion = min((c_loop(wave, LAG, duration, 5e-4) for _ in range(tries)), key=lambda r: r[0])
-    ours = best_time(lambda: run.run(timeline, rest), tries)
+    ours = best_time(lambda: run.integrate(timeline, rest), tries)
     again = min(c_loop(wave, LAG, duration, 5e-4)[0] for _ in range(tries))
     floor = min(floor, again)
     for name, seconds, motion in (("this package", ours, _motion(run, tight, gait.period_s)),
@@ -62,7 +62,7 @@ def _ours(
 def _motion(
     run: Integrator, timeline: Timeline, period_s: float, tolerance: float | None = None
 ) -> np.ndarray:
-    path = run.run(timeline, run.rest(), *([] if tolerance is None else [tolerance]))
+    path = run.integrate(timeline, run.rest(), *([] if tolerance is None else [tolerance]))
     first = int(np.argmin(abs(path.time_s - (path.time_s[-1] - period_s))))
     return last_cycle(path.pose[first], path.pose[-1])
 

@@ -26,7 +26,7 @@ def generated(robot: Robot, rng: np.random.Generator) -> tuple[StepTest, ...]:
     run, tests = Integrator(robot.with_values(friction_speed_m_s=2e-5)), []
     valve = np.eye(robot.segments)[:, [SEGMENT - 1]]
     for pressure in PRESSURES_KPA:
-        path = run.run(Timeline.constant(np.array([0.8]), valve, pressure, 1e-9), run.rest(), 2e-6)
+        path = run.integrate(Timeline.constant(np.array([0.8]), valve, pressure, 1e-9), run.rest(), 2e-6)
         for condition, curve in (("lifted", path.no_load), ("ground", path.kappa)):
             readings = np.interp(TIME_S, path.time_s, curve[:, SEGMENT - 1])
             readings += SD_1_M * rng.standard_normal(TIME_S.size)

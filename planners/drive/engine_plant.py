@@ -19,6 +19,7 @@ from planners.search.problem import Problem
 from planners.view.record import maze_record
 from srs_opt.judge.bodies import body_of, check_engine, drive_of, pull_of, slope_of
 from srs_opt.judge.walls import boxes_of
+from srs_opt.model.state import FORWARD, SIDEWAYS, YAW_MOMENTUM
 from srs_opt.robot import Robot
 from srs_opt.simulate.integrate import Integrator, Trajectory
 from srs_opt.simulate.timeline import Timeline
@@ -76,10 +77,12 @@ class EnginePlant:
         velocity, turning = self._snake.link_velocities(), self._snake.turn_rates()
         own = mass @ velocity / mass.sum()
         c, s = math.cos(pose[2]), math.sin(pose[2])
-        state[3], state[4] = c * own[0] + s * own[1], c * own[1] - s * own[0]
+        state[FORWARD], state[SIDEWAYS] = c * own[0] + s * own[1], c * own[1] - s * own[0]
         arm = np.stack([seen.x_m[-1], seen.y_m[-1]], axis=1) - pose[:2]
         inertia = np.array([link.inertia_kg_m2 for link in self._snake.body.links])
-        state[5] = mass @ (arm[:, 0] * velocity[:, 1] - arm[:, 1] * velocity[:, 0]) + inertia @ turning
+        state[YAW_MOMENTUM] = (
+            mass @ (arm[:, 0] * velocity[:, 1] - arm[:, 1] * velocity[:, 0]) + inertia @ turning
+        )
         state[layout.kappa] = seen.bend_rad[-1] / self.robot.segment_length_m
         state[layout.dkappa] = np.diff(turning) / self.robot.segment_length_m
         n, first = self.robot.segments, layout.actuator.start

@@ -21,6 +21,7 @@ from planners.search.problem import ROUNDING_M, Problem
 from planners.search.tree import Root, arrival_index
 from srs_opt.errors import InputError, NoAnswerError
 from srs_opt.model.parameters import valve_delay_s
+from srs_opt.model.state import FORWARD, POSE, POSE_AND_SPEED
 from srs_opt.robot import Robot
 from srs_opt.simulate.timeline import Timeline
 
@@ -133,7 +134,9 @@ class Drive:
 
     def _follow(self, plan: Plan) -> None:
         self.plan, self.reference = plan, reference_of(self.problem, plan)
-        self.ends = np.array([self.state[:4], *(state[:4] for state in plan.certificate.states)])
+        self.ends = np.array(
+            [self.state[POSE_AND_SPEED], *(state[POSE_AND_SPEED] for state in plan.certificate.states)]
+        )
         self.gaits_before = np.array([self.before, *plan.gaits])
         self.node = self.idle = 0
 
@@ -207,7 +210,7 @@ class Drive:
         leaves the most. Where every gait that was tried touches, the first is returned with a clearance that
         forbids it.
         """
-        where = Where(self.state[:3].copy(), self.before, float(self.state[3]))
+        where = Where(self.state[POSE].copy(), self.before, float(self.state[FORWARD]))
         planned = self._gait_by_plan(self.state)
         enough_m = self.ensemble.enough_m
         if planned is not None and self._room_m(self.state, planned) > enough_m:
@@ -246,7 +249,7 @@ class Drive:
 
     def _gait_by_plan(self, state: Array) -> int | None:
         """Return the gait that the plan plays next, if the robot is as the plan has it after a cycle."""
-        off = np.abs(state[:4] - self.ends[:-1])
+        off = np.abs(state[POSE_AND_SPEED] - self.ends[:-1])
         off[:, 2] = np.abs((off[:, 2] + math.pi) % (2 * math.pi) - math.pi)
         length = self.problem.robot.length_m
         off = (off / (np.array(ON_TRACK) * (length, length, 1.0, length))).max(axis=1)
@@ -277,7 +280,7 @@ class Drive:
     def _cycle(self, index: int) -> str | None:
         """Play one cycle; return what ended the drive, if anything."""
         period_s = self.problem.joints.gait(index).period_s
-        begin, before = self.state[:3].copy(), self.state
+        begin, before = self.state[POSE].copy(), self.state
         cycle = self.problem.joints.timeline(self.before, index)
         plain = self.problem.joints.is_plain(self.before, index)
         start_s = self.watch.time_s
@@ -293,7 +296,7 @@ class Drive:
             return "arrived"
         self.ensemble.learn(before, cycle, self.state, (gait_before, index))
         c, s = math.cos(begin[2]), math.sin(begin[2])
-        dx, dy, turn = self.state[:3] - begin
+        dx, dy, turn = self.state[POSE] - begin
         observed = np.array([c * dx + s * dy, c * dy - s * dx, turn])
         self.learned = self.learned.update(
             self.predicted,
@@ -302,7 +305,7 @@ class Drive:
             self.problem.motion.row(index),
             self.problem.robot.length_m,
         )
-        node = nearest_node(self.reference, self.state[:3], self.node)
+        node = nearest_node(self.reference, self.state[POSE], self.node)
         self.idle = 0 if node > self.node else self.idle + 1
         self.node = node
         return None

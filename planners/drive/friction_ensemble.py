@@ -16,6 +16,7 @@ from planners.drive.contact import BodyWatch
 from planners.motion.robots import undelayed, with_friction_times
 from planners.search.problem import Problem
 from srs_opt.errors import NoAnswerError
+from srs_opt.model.state import POSE_AND_SPEED
 from srs_opt.orbit.body import integrator
 from srs_opt.robot import Robot
 from srs_opt.simulate.batched import run_batched
@@ -107,9 +108,9 @@ class FrictionEnsemble:
 
         A rigid plan's state does not know how a soft body is bent; the suspect's own last cycle does.
         """
-        if run.layout == self.problem.run.layout:
+        if run.layout == self.problem.integrator.layout:
             return state
-        begun = run.layout.adopt(state, self.problem.run.layout)
+        begun = run.layout.adopt(state, self.problem.integrator.layout)
         if run in self._bends and np.array_equal(state, self._now):
             begun[run.layout.kappa.start : run.layout.dkappa.stop] = self._bends[run]
         return begun
@@ -123,7 +124,7 @@ class FrictionEnsemble:
         """
         run = self._runs[int(self._misses.argmin()) if suspect is None else suspect]
         try:
-            trajectory = self._bent(run.run(timeline, self._begun(run, state)), cycle)
+            trajectory = self._bent(run.integrate(timeline, self._begun(run, state)), cycle)
         except NoAnswerError:
             return -math.inf
         watch = BodyWatch(self.problem, self.problem.robot, run)
@@ -160,6 +161,6 @@ def _miss(foreseen: Trajectory | NoAnswerError, after: Array, scales: Array) -> 
     """Return how far a cycle ends from where it did, squared; infinity where the model could not go on."""
     if isinstance(foreseen, NoAnswerError):
         return math.inf
-    off = foreseen.final[:4] - after[:4]
+    off = foreseen.final[POSE_AND_SPEED] - after[POSE_AND_SPEED]
     off[2] = (off[2] + math.pi) % (2 * math.pi) - math.pi
     return float(((off / scales) ** 2).sum())

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planners.drive.friction_ensemble import FrictionEnsemble
+from srs_opt.model.state import FORWARD
 from srs_opt.simulate.timeline import Timeline
 
 COAST_S = 1.5  # watched after the valves have been vented
@@ -29,7 +30,7 @@ def halt(ensemble: FrictionEnsemble, state: NDArray[np.float64], before: int) ->
     joints = problem.joints
     vent = joints.vent(before, COAST_S)
     best, most_m = vent, ensemble.least_room_m(state, vent)
-    forward = float(state[3]) > 0
+    forward = float(state[FORWARD]) > 0
     possible = np.flatnonzero(problem.motion.may_follow(before))
     ahead = np.array([entry.speed_m_s > 0 for entry in problem.gaits.gaits]) == forward
     brakes, steers = possible[~ahead[possible]], possible[ahead[possible]]

@@ -77,7 +77,7 @@ class SimulatedPlant:
 
     def play(self, timeline: Timeline, gait: int | None) -> Trajectory:
         """Integrate the model over the timeline."""
-        trajectory = self.run.run(timeline, self._state)
+        trajectory = self.run.integrate(timeline, self._state)
         self._state = trajectory.final
         self.state = self._problem.as_planned(self._state, self.run)
         return trajectory

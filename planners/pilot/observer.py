@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from planners.pilot.pose import Sighting
 from srs_opt.measurement.chain import Chain, link_positions, position_jacobian
+from srs_opt.model.state import FORWARD, POSE, SIDEWAYS
 from srs_opt.simulate.integrate import Trajectory
 
 Array = NDArray[np.float64]
@@ -74,10 +75,10 @@ class Correction:
         """Return the corrected motion, its last state included (place, heading, speed)."""
         pose = motion.pose + self.offset + self.drift * motion.time_s[:, None]
         final = motion.final.copy()
-        final[:3] = pose[-1]
+        final[POSE] = pose[-1]
         c, s = math.cos(pose[-1, 2]), math.sin(pose[-1, 2])
-        final[3] += c * self.drift[0] + s * self.drift[1]
-        final[4] += c * self.drift[1] - s * self.drift[0]
+        final[FORWARD] += c * self.drift[0] + s * self.drift[1]
+        final[SIDEWAYS] += c * self.drift[1] - s * self.drift[0]
         return replace(motion, pose=pose, final=final)
 
 

@@ -27,6 +27,7 @@ from planners.search.problem import Problem
 from srs_opt.controller.program import Program, events_of
 from srs_opt.errors import NoAnswerError
 from srs_opt.measurement.chain import chain_of
+from srs_opt.model.state import HEADING
 from srs_opt.orbit.body import integrator
 from srs_opt.simulate.integrate import Integrator, Trajectory
 from srs_opt.simulate.shapes import centre_lines
@@ -159,7 +160,7 @@ class PilotedPlant:
             self._line.cycle(None, period, pressure_pa, events, self._program.words)
         else:
             self._line.select(gait, None)
-        motions = [run.run(timeline, self.state) for run in self._runs]
+        motions = [run.integrate(timeline, self.state) for run in self._runs]
         begin_s = self._wait_for_cycle(cycles)
         self._log.played(begin_s, timeline)
         lead_s = 0.0 if ends else min(self._lead_s(), MOST_LEAD * timeline.end_s)
@@ -178,7 +179,7 @@ class PilotedPlant:
         self.latency = correction.latency
         self.corrections.append((float(np.hypot(*correction.offset[:2])), correction.residual_m))
         motion = correction.apply(motion)
-        self._heading = float(motion.final[2])
+        self._heading = float(motion.final[HEADING])
         self.state = self._problem.as_planned(motion.final)
         return motion
 
@@ -240,7 +241,7 @@ class PilotedPlant:
         """Wait until the vented robot stands still; return the motion, ending where it was seen to rest."""
         before = self.state if motion is None else motion.final
         vent = timeline.part(slice(_last_push(timeline) + 1, None))
-        coasting = self._runs[int(self._misfits.argmin())].run(vent, before)
+        coasting = self._runs[int(self._misfits.argmin())].integrate(vent, before)
         if motion is not None:
             coasting = motion.then(coasting)
         self._log.played(self._clock.now(), vent)

@@ -20,6 +20,7 @@ from planners.plan.answer import Plan
 from planners.search.problem import Problem
 from srs_opt.controller.program import Program
 from srs_opt.errors import InputError, NoAnswerError
+from srs_opt.model.state import HEADING, X, Y
 
 LONGEST_DECISION_S = 0.1  # that the first cycle is prepared for; later ones by what was seen
 AT_START, AT_START_RAD = 0.127, 0.15  # body lengths, rad; farther from the maze's start, and nothing is begun
@@ -128,11 +129,11 @@ def pilot(
 
 def _check_start(problem: Problem, state: np.ndarray) -> None:
     start = problem.start
-    off_m = float(np.hypot(state[0] - start.x, state[1] - start.y))
-    off_rad = abs(float(state[2]) - start.heading)
+    off_m = float(np.hypot(state[X] - start.x, state[Y] - start.y))
+    off_rad = abs(float(state[HEADING]) - start.heading)
     if off_m > AT_START * problem.robot.length_m or off_rad > AT_START_RAD:
         raise InputError(
-            f"the robot lies at ({state[0]:.3f}, {state[1]:.3f}), heading {state[2]:.2f}; the start is at "
+            f"the robot lies at ({state[X]:.3f}, {state[Y]:.3f}), heading {state[HEADING]:.2f}; the start is "
             f"({start.x:.3f}, {start.y:.3f}), {start.heading:.2f}: put it there, or plan from where it lies: "
-            f"--start {state[0]:.3f},{state[1]:.3f},{state[2]:.2f}"
+            f"--start {state[X]:.3f},{state[Y]:.3f},{state[HEADING]:.2f}"
         )

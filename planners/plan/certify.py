@@ -147,7 +147,7 @@ class Certifier:
         """Return whether a few bodies of a cycle tell that it overlaps a wall, whatever the error is."""
         problem = self.problem
         few = np.linspace(0, cycle.time_s.size - 1, GLANCES).astype(int)
-        lines = body_in_room(centre_lines(problem.run, cycle.kappa[few]), cycle.pose[few])
+        lines = body_in_room(centre_lines(problem.integrator, cycle.kappa[few]), cycle.pose[few])
         deepest = float(problem.body.estimate(lines).min()) + problem.field.error_m
         return deepest < -SURE * problem.robot.length_m
 
@@ -158,7 +158,7 @@ class Certifier:
         state = known.cycles[index - 1].final if index else self.root.state
         timeline = problem.joints.timeline(before, now, CERTIFIED_STAIR_S / FINER ** (level / 2))
         tolerance = TOLERANCE * problem.robot.length_m / FINER**level
-        played = yield from problem.run.travel(timeline, state, tolerance)
+        played = yield from problem.integrator.travel(timeline, state, tolerance)
         return problem.bent(played, before, now)
 
     def _judged(
@@ -167,7 +167,7 @@ class Certifier:
         """Return the certificate, and whether a finer integration would not change it for the better."""
         problem, root = self.problem, self.root
         time, pose, kappa, cycle = _joined(cycles)
-        lines = body_in_room(centre_lines(problem.run, kappa), pose)
+        lines = body_in_room(centre_lines(problem.integrator, kappa), pose)
         arrived = arrival_index(problem.goal, pose)
         last = len(time) if arrived is None else arrived + 1
         time, pose, lines, kappa, cycle = time[:last], pose[:last], lines[:last], kappa[:last], cycle[:last]
@@ -208,7 +208,7 @@ class Certifier:
 
     def _error_m(self, fine: list[Trajectory], coarse: list[Trajectory]) -> tuple[Array, Array]:
         """Return instants, and how far the coarser integration has been off until then over RATIO."""
-        run = self.problem.run
+        run = self.problem.integrator
         # the finer nodes lie a millisecond apart: what a line between two of them misses is a micrometre
         time, *fine_columns, _ = _joined(fine)
         at, pose, kappa, _ = _joined([_thinned(t, COMPARED) for t in coarse])

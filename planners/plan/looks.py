@@ -132,7 +132,7 @@ def _closed_loop(problem: Problem, plan: Plan, tolerance: Tolerance) -> float:
             moved = state.copy()
             moved[3] += off
             keys.append((k, b, gait))
-            searches.append(problem.run.travel(problem.joints.timeline(b, gait), moved))
+            searches.append(problem.integrator.travel(problem.joints.timeline(b, gait), moved))
     least_m = float("inf")
     for (k, b, gait), found in zip(keys, run_batched(searches)):
         if isinstance(found, NoAnswerError):
@@ -141,7 +141,7 @@ def _closed_loop(problem: Problem, plan: Plan, tolerance: Tolerance) -> float:
         begun_s = ends_s[k - 1] if k else 0.0
         seen = np.flatnonzero(trajectory.time_s + begun_s <= c.time_s[-1] + 1e-9)[::THINNED]
         pose = trajectory.pose[seen]
-        body = centre_lines(problem.run, trajectory.kappa[seen])
+        body = centre_lines(problem.integrator, trajectory.kappa[seen])
         tube = tolerance.position_m + problem.bending.tube_m(pose)
         for turn in (-tolerance.heading_rad, 0.0, tolerance.heading_rad):
             lines = body_in_room(body, _turned(pose, turn))

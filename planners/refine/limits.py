@@ -13,6 +13,7 @@ from planners.maze.places import Goal
 from planners.refine.shots import WindowShot
 from planners.search.problem import Problem
 from srs_opt.manoeuvre.rows import BEND_M2, LEVER_M, body_points
+from srs_opt.model.state import FORWARD, HEADING
 
 Array = NDArray[np.float64]
 LOOK_S = 0.005  # between instants at which the body is measured; it moves 3 mm meanwhile
@@ -86,12 +87,12 @@ class Limits:
                 value = unit * (tolerance - sign * (state[index] - wanted[index]))
                 found.append(_row(value, None if slopes is None else -sign * unit * slopes[index]))
         forward = 1.0 if wanted[3] >= 0 else -1.0
-        value = LEVER_M * (forward * (state[3] - wanted[3]) + SPEED * length)
+        value = LEVER_M * (forward * (state[FORWARD] - wanted[3]) + SPEED * length)
         found.append(_row(value, None if slopes is None else LEVER_M * forward * slopes[3]))
         return found + self._bends(shot, slopes)
 
     def _bends(self, shot: WindowShot, slopes: Array | None) -> list[Values]:
-        where = self.problem.run.layout.kappa
+        where = self.problem.integrator.layout.kappa
         assert self.end.state is not None
         wanted, largest = self.end.state[where], float(np.abs(shot.states[:, where]).max())
         found = []
@@ -107,7 +108,7 @@ class Limits:
         inside, toward = depth(goal, state[:2])
         found = [_row(inside - self.spare_m / 4, None if slopes is None else toward @ slopes[:2])]
         if goal.heading is not None:
-            off = (state[2] - goal.heading + np.pi) % (2 * np.pi) - np.pi
+            off = (state[HEADING] - goal.heading + np.pi) % (2 * np.pi) - np.pi
             for sign in (1.0, -1.0):
                 value = LEVER_M * (0.99 * goal.heading_tolerance - sign * off)
                 found.append(_row(value, None if slopes is None else -sign * LEVER_M * slopes[2]))
@@ -115,7 +116,7 @@ class Limits:
 
     def _rooms(self, shots: list[WindowShot]) -> list[Values]:
         """Return the clearance beyond the margin, where it is small: of each body's nearest points."""
-        problem, run = self.problem, self.problem.run
+        problem, run = self.problem, self.problem.integrator
         looked = [_looks(shot) for shot in shots]
         bodies = [body_points(run, shot.states[at], None)[0] for shot, at in zip(shots, looked)]
         wanted = [self._wanted(shot, at) for shot, at in zip(shots, looked)]
@@ -149,7 +150,7 @@ class Limits:
         toward = (np.stack(aside, axis=1) - clear[:, None]) / _HAIR_M
         bodies, index = np.unique(which[0], return_inverse=True)
         nodes = at[bodies]
-        _, lines = body_points(self.problem.run, shot.states[nodes], shot.slopes[nodes])
+        _, lines = body_points(self.problem.integrator, shot.states[nodes], shot.slopes[nodes])
         assert lines is not None
         return np.asarray(np.einsum("nk,nkm->nm", toward, lines[index, which[1]]))
 

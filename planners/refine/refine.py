@@ -92,7 +92,7 @@ def check_refinable(problem: Problem) -> None:
         raise InputError("--refine optimizes the model's own motion: expected no --drive beside it")
     if problem.cost != "time":
         raise InputError(f"--refine shortens the time: expected --cost time beside it, found {problem.cost}")
-    run = problem.run
+    run = problem.integrator
     if not run.actuator.linear or _knows_frequency(run):
         raise InputError(
             f"--refine: the actuators of robot '{problem.robot.name}' have an effect that is not linear or "
@@ -169,7 +169,9 @@ class _Refiner:
                 window = _until(window, self.arrives_s)
             end = End() if last else End(self.ends[first + size - 1])
             limits = Limits(problem, end, slack if not kept else 0.0, self.spare)
-            solver = WindowSolver(problem.run, state, limits, before, problem.joints.limits, self.pressures)
+            solver = WindowSolver(
+                problem.integrator, state, limits, before, problem.joints.limits, self.pressures
+            )
             if not last:
                 solver.tail_s = standing_s(guess[size].gait, problem.joints.limits.dwell_s)
             found = solver.solve(window, STEPS)
@@ -204,7 +206,7 @@ class _Refiner:
 
     def _played(self, joint: Joint, state: Array) -> Array:
         tolerance = TOLERANCE * self.problem.robot.length_m / 16
-        return self.problem.run.run(joint.timeline(CERTIFIED_STAIR_S), state, tolerance).final
+        return self.problem.integrator.integrate(joint.timeline(CERTIFIED_STAIR_S), state, tolerance).final
 
 
 def _until(window: Window, arrives_s: float) -> Window:

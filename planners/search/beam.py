@@ -18,6 +18,7 @@ from planners.search.costmap import BLOCKED_S
 from planners.search.heuristic import cost_to_go, motion_lines
 from planners.search.problem import Cycle, Problem
 from planners.search.tree import Root, Step, Tree, arrival_index, at_rest, cell_of
+from srs_opt.model.state import FORWARD, HEADING, PLACE, X, Y
 
 TOGETHER = 8  # cycles simulated in one go
 FIRST_LOOK = 32  # gaits whose bodies are looked at first, most promising first
@@ -115,7 +116,7 @@ class BeamSearch:
         """Return the least cost to the goal from the centres of mass of some nodes."""
         if not nodes:
             return math.inf
-        places = np.array([self._tree.cycle[node].state[:2] for node in nodes])
+        places = np.array([self._tree.cycle[node].state[PLACE] for node in nodes])
         return float(self.problem.to_goal.at(places).min())
 
     def _expansions(self, node: int) -> list[_Expansion]:
@@ -123,7 +124,7 @@ class BeamSearch:
         self.expanded += 1
         problem, s, motion = self.problem, self.settings, self.problem.motion
         state, before = self._tree.cycle[node].state, self._tree.gait[node]
-        move = motion.move(state[0], state[1], state[2], before, state[3])
+        move = motion.move(state[X], state[Y], state[HEADING], before, state[FORWARD])
         left = cost_to_go(problem, move.pose[:, -1], move.speed_m_s, s.by_heading)
         order = np.argsort(left + motion.period_s, kind="stable")
         order = order[(left[order] < BLOCKED_S / 2) & motion.may_follow(before)[order]]
@@ -170,7 +171,7 @@ class BeamSearch:
     def _taken(self, expansion: _Expansion, cycle: Cycle) -> int | None:
         """Keep a simulated cycle if it is clear and the cheapest to come here; None too where it arrives."""
         s, state, length = self.settings, cycle.state, self.problem.robot.length_m
-        course = state[2] + self.problem.motion.course[expansion.gait]
+        course = state[HEADING] + self.problem.motion.course[expansion.gait]
         key = cell_of(state, course, s.cell * length, s.course_rad, s.speed * length)
         if self._cheapest.get(key, math.inf) <= expansion.spent:
             return None

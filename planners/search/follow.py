@@ -9,6 +9,7 @@ from planners.drive.track import Learned, Reference, Where, choose, nearest_node
 from planners.search.costmap import speed_by_room
 from planners.search.problem import Problem
 from planners.search.tree import Step, arrival_index, at_rest
+from srs_opt.model.state import FORWARD, POSE
 
 Array = NDArray[np.float64]
 SPACING = 0.127  # body lengths between the nodes of a reference
@@ -42,7 +43,7 @@ def follow(problem: Problem, reference: Reference) -> list[Step] | None:
     state, gait, node = root.state, root.gait, 0
     steps: list[Step] = []
     for _ in range(10 + int(PATIENCE * reference.left_s[0] / CYCLE_S)):
-        where = Where(state[:3], gait, float(state[3]))
+        where = Where(state[POSE], gait, float(state[FORWARD]))
         choice = choose(problem, reference, where, Learned(), node)
         cycle = problem.simulate(state, gait, choice.gait)
         slack = cycle.tube_m if steps else problem.start_slack_m
@@ -52,5 +53,5 @@ def follow(problem: Problem, reference: Reference) -> list[Step] | None:
         if arrival_index(problem.goal, cycle.pose) is not None:
             return steps
         state, gait = cycle.state, choice.gait
-        node = nearest_node(reference, state[:3], node)
+        node = nearest_node(reference, state[POSE], node)
     return None

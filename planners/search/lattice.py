@@ -18,6 +18,7 @@ from planners.search.costmap import BLOCKED_S
 from planners.search.heuristic import cost_to_go, motion_lines
 from planners.search.problem import Cycle, Problem
 from planners.search.tree import Root, Step, Tree, arrival_index, at_rest, cell_of
+from srs_opt.model.state import FORWARD, HEADING, X, Y
 
 
 @dataclass(frozen=True)
@@ -123,7 +124,7 @@ class LatticeSearch:
             room = float(self.problem.body.estimate(cycle.lines[::2]).min())
             halvings = math.log2(s.close * length / max(room, s.close * length / 2**s.most_halvings))
             finer = max(math.ceil(halvings), 0)
-        course = state[2] + self.problem.motion.course[gait]
+        course = state[HEADING] + self.problem.motion.course[gait]
         return finer, *cell_of(
             state, course, s.cell * length / 2**finer, s.course_rad / 2**finer, s.speed * length
         )
@@ -133,7 +134,7 @@ class LatticeSearch:
         self.expanded += 1
         problem, s, motion = self.problem, self.settings, self.problem.motion
         state, before = self._tree.cycle[node].state, self._tree.gait[node]
-        move = motion.move(state[0], state[1], state[2], before, state[3])
+        move = motion.move(state[X], state[Y], state[HEADING], before, state[FORWARD])
         # every other point and sample decides what is out of the question; the simulation decides the rest
         lines = motion_lines(problem, before, move.pose, self._gaits)
         room = problem.body.estimate(lines).min(axis=1)

@@ -158,7 +158,7 @@ class Problem:
         return min(clearance - self.margin_m, 0.0) - ROUNDING_M
 
     @cached_property
-    def run(self) -> Integrator:
+    def integrator(self) -> Integrator:
         """The dynamic model, without effects that know the room and without the valves' delay."""
         return integrator(undelayed(self.robot), self.gaits.model)
 
@@ -180,7 +180,7 @@ class Problem:
         """Return the cycle of a gait after another, made when it is first asked for."""
         key = (gait, gait) if self.joints.is_plain(before, gait) else (before, gait)
         if key not in self._cycles:
-            self._cycles[key] = CycleRun(self.run, self.joints.timeline(*key), STEP_S)
+            self._cycles[key] = CycleRun(self.integrator, self.joints.timeline(*key), STEP_S)
         return self._cycles[key]
 
     def as_planned(self, state: Array, run: Integrator | None = None) -> Array:
@@ -188,7 +188,7 @@ class Problem:
 
         `run` is that robot's model; by default one of the planned robot's kind.
         """
-        return self.run.layout.adopt(state, (run or self.run).layout)
+        return self.integrator.layout.adopt(state, (run or self.integrator).layout)
 
     def bent(self, trajectory: Trajectory, before: int, gait: int) -> Trajectory:
         """Return the model's trajectory of one cycle as measured factors have it."""
@@ -224,8 +224,8 @@ class Problem:
         if not went:
             return []
         samples = np.stack([sampled for *_, (_, sampled) in went])
-        curved = samples[..., self.run.layout.kappa]
-        lines = centre_lines(self.run, curved.reshape(-1, curved.shape[-1]))
+        curved = samples[..., self.integrator.layout.kappa]
+        lines = centre_lines(self.integrator, curved.reshape(-1, curved.shape[-1]))
         share = np.linspace(0.0, 1.0, samples.shape[1])
         pose = np.stack([self.bending.placed(p, b, g, share) for (b, g, _), p in zip(went, samples[..., :3])])
         placed = body_in_room(lines.reshape(*curved.shape[:-1], *lines.shape[1:]), pose)

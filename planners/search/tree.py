@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from planners.maze.places import Goal
 from planners.search.problem import Cycle, Problem
+from srs_opt.model.state import FORWARD, X, Y
 
 Array = NDArray[np.float64]
 
@@ -26,7 +27,7 @@ class Root(NamedTuple):
 def at_rest(problem: Problem) -> Root:
     """Return the straight robot at rest at the start."""
     start = problem.start
-    state = problem.run.rest(start.x, start.y, start.heading)
+    state = problem.integrator.rest(start.x, start.y, start.heading)
     return Root(state, problem.motion.rest, problem.start_slack_m)
 
 
@@ -68,10 +69,10 @@ def cell_of(
 ) -> tuple[int, int, int, int]:
     """Return the cell of place, course and forward speed that a state lies in."""
     return (
-        math.floor(state[0] / cell_m),
-        math.floor(state[1] / cell_m),
+        math.floor(state[X] / cell_m),
+        math.floor(state[Y] / cell_m),
         math.floor(course_rad % (2 * math.pi) / cell_rad),
-        math.floor(state[3] / cell_m_s + 0.5),
+        math.floor(state[FORWARD] / cell_m_s + 0.5),
     )
 
 

@@ -17,7 +17,7 @@ from srs_opt.calibrate.initial_pose import initial_pose
 from srs_opt.calibrate.trial_simulation import Nodes
 from srs_opt.model.parameters import Structure
 from srs_opt.model.registry import state_layout
-from srs_opt.model.state import StateLayout
+from srs_opt.model.state import POSE, StateLayout
 from srs_opt.simulate.integrate import step_kernel
 from srs_opt.simulate.kernel import LANES, Course, Kernel
 from srs_opt.simulate.rosenbrock import BODY_STATES
@@ -66,7 +66,7 @@ def variation(
     courses = []
     for off, seed, turn in zip(hair, seeds.T, (initial_pose(structure, p, heading_rad)[1] @ seeds).T):
         x = start.copy()
-        x[:3] += off * turn
+        x[POSE] += off * turn
         courses.append(course(x, p + off * seed))
     # another structure integrates the actuators otherwise: what it makes of the nodes' motion comes first
     if not same:

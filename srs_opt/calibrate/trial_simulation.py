@@ -14,7 +14,7 @@ from srs_opt.gait import Gait, Wave
 from srs_opt.measurement.records import Applied, Schedule, Trial
 from srs_opt.model.parameters import Structure
 from srs_opt.model.registry import state_layout
-from srs_opt.model.state import StateLayout
+from srs_opt.model.state import BODY, POSE, StateLayout
 from srs_opt.simulate.batched import Search, StepRequest, StepResult, run_one
 from srs_opt.simulate.integrate import step_kernel
 from srs_opt.simulate.kernel import Kernel
@@ -158,7 +158,7 @@ class TrialRun:
     def search(
         self, values: Values, tolerance_m_s: float = TOLERANCE_M_S, attempts: int = ATTEMPTS
     ) -> Search[Nodes]:
-        """Do what a call does, as a search: see `simulate.together` for many trials at once.
+        """Do what a call does, as a search: see `simulate.batched` for many trials at once.
 
         With a single one of `attempts` the last meshes serve as they are.
         """
@@ -185,7 +185,7 @@ class TrialRun:
 
     def _start(self, structure: Structure, p: np.ndarray) -> np.ndarray:
         x = np.zeros(state_layout(structure).size)
-        x[:3] = initial_pose(self.model.full, p, self.trial.heading_rad)[0]
+        x[POSE] = initial_pose(self.model.full, p, self.trial.heading_rad)[0]
         return x
 
     def _piece(
@@ -255,7 +255,7 @@ def _nodes(
     free = states[layout.actuator]
     return Nodes(
         time_s=np.concatenate([[0.0], np.cumsum(h_s)]),
-        body=states[:6].T,
+        body=states[BODY].T,
         kappa=states[layout.kappa].T,
         dkappa=states[layout.dkappa].T,
         no_load=free[: layout.segments].T,

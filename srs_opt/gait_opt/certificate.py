@@ -220,7 +220,7 @@ def _certified(
 def standing_start(robot: Robot, gait: Gait, model: str, cycles: int = CYCLES) -> float:
     """Return the mean speed (m/s) over the last of `cycles` cycles from rest."""
     run = _undelayed(robot, model)
-    path = run.run(Timeline.of_gait(gait, cycles * gait.period_s), run.rest())
+    path = run.integrate(Timeline.of_gait(gait, cycles * gait.period_s), run.rest())
     return motion_of_cycle(run, path, gait, cycles - 1).speed_m_s
 
 
@@ -234,7 +234,7 @@ def periodicity_gap(robot: Robot, gait: Gait, model: str, orbit: Orbit, cycles: 
     """Return by how much velocity and shape change over simulated cycles, relative to their size."""
     start = orbit.solution.start
     run = _undelayed(robot, model)
-    x = run.run(Timeline.of_gait(gait, cycles * gait.period_s), start).final
+    x = run.integrate(Timeline.of_gait(gait, cycles * gait.period_s), start).final
     change = np.abs(x - start)
     speeds = orbit.solution.states[VELOCITY]
     momentum = np.abs(speeds[2]).max() or 1.0

@@ -11,6 +11,7 @@ from srs_opt.manoeuvre.rows import RowMaker
 from srs_opt.manoeuvre.shooting import Shot
 from srs_opt.manoeuvre.task import Task
 from srs_opt.manoeuvre.valves import ValvePlan
+from srs_opt.model.state import POSE
 from srs_opt.simulate.integrate import TOLERANCE_M_S, Integrator, Trajectory
 
 FINER = 16.0
@@ -74,9 +75,9 @@ class Certificate:
 
 def certify(run: Integrator, task: Task, plan: ValvePlan) -> tuple[Certificate, Trajectory]:
     """Simulate a manoeuvre afresh and check it against its task."""
-    coarse = run.run(plan.timeline(), task.start.state, TOLERANCE_M_S / FINER)
-    fine = run.run(plan.timeline(), task.start.state, TOLERANCE_M_S / FINER**2)
-    apart = (coarse.final[:3] - fine.final[:3]) * (1.0, 1.0, 0.1)
+    coarse = run.integrate(plan.timeline(), task.start.state, TOLERANCE_M_S / FINER)
+    fine = run.integrate(plan.timeline(), task.start.state, TOLERANCE_M_S / FINER**2)
+    apart = (coarse.final[POSE] - fine.final[POSE]) * (1.0, 1.0, 0.1)
     error = float(np.hypot(*apart[:2]) + abs(apart[2])) / RATIO
     shot = Shot(plan, fine.time_s, seen_states(run, fine))
     rows = RowMaker(run, task, inside=1.0)

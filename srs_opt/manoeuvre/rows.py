@@ -16,6 +16,7 @@ from srs_opt.manoeuvre.task import (
     REST_SPEED_M_S,
     Task,
 )
+from srs_opt.model.state import PLACE, POSE
 from srs_opt.orbit.motion import rotate
 from srs_opt.simulate.integrate import Integrator
 from srs_opt.simulate.shapes import centre_lines
@@ -142,7 +143,7 @@ class RowMaker:
         return rows
 
     def _near_start(self, shot: Shot, looked: np.ndarray, radius: float) -> Part:
-        away = shot.states[looked, :2] - self.task.start.state[:2]
+        away = shot.states[looked, :2] - self.task.start.state[PLACE]
         distance = np.hypot(*away.T)
         slope = np.zeros((looked.size, 0))
         if shot.slopes is not None:
@@ -190,7 +191,7 @@ def body_points(
     moved : array (n, nx, m) or None
         Their slopes, where those of the lines are asked for.
     """
-    kappa, (x, y, heading) = states[:, run.layout.kappa], states[:, :3].T
+    kappa, (x, y, heading) = states[:, run.layout.kappa], states[:, POSE].T
     line = centre_lines(run, kappa)
     bx, by = rotate(heading[:, None], line[..., 0], line[..., 1])
     points = np.stack([x[:, None] + bx, y[:, None] + by], axis=-1)

@@ -17,6 +17,7 @@ from srs_opt.manoeuvre.shooting import shoot
 from srs_opt.manoeuvre.solve import Candidate, Solver
 from srs_opt.manoeuvre.task import Task
 from srs_opt.manoeuvre.valves import COINCIDENT_S, ValvePlan, ValveRow, gait_end
+from srs_opt.model.state import POSE, X
 
 PLANS = 960  # simulated at most, several lengths of time per wave where the end is not merely passed
 WAVES = 30  # per start that is wanted
@@ -79,9 +80,9 @@ def _until_arrival(solver: Solver, gaits: Sequence[Gait]) -> list[ValvePlan]:
     plans = []
     longest = [playable(task, lengths(task, g)[-1]) for g in gaits]
     for shot in shoot(solver.run, task.start.state, longest, solver.step_s):
-        pose = shot.states[:, :3] - task.start.state[:3]
+        pose = shot.states[:, POSE] - task.start.state[POSE]
         done = np.ones(shot.time_s.size, dtype=bool)
-        for wanted, have in ((end.past_m, shot.states[:, 0]), (end.turn_rad, pose[:, 2])):
+        for wanted, have in ((end.past_m, shot.states[:, X]), (end.turn_rad, pose[:, 2])):
             if wanted is not None:
                 done &= np.sign(wanted) * have >= abs(wanted)
         if done.any():

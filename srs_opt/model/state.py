@@ -11,7 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-POSE, VELOCITY, WORK = slice(0, 3), slice(3, 6), 6
+X, Y, HEADING, FORWARD, SIDEWAYS, YAW_MOMENTUM, WORK = range(7)
+PLACE, POSE, VELOCITY, BODY = slice(0, 2), slice(0, 3), slice(3, 6), slice(0, 6)
+POSE_AND_SPEED = slice(0, 4)  # what tells where the robot is going: pose and forward speed
 BODY_STATES = 7
 
 

@@ -21,7 +21,7 @@ from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait
 from srs_opt.model.parameters import Structure
 from srs_opt.model.registry import build
-from srs_opt.model.state import WORK
+from srs_opt.model.state import POSE, WORK
 from srs_opt.orbit.actuators import periodic_actuators
 from srs_opt.orbit.period_map import PeriodMap, period_map, plain_period_map
 from srs_opt.simulate.batched import Search
@@ -138,7 +138,7 @@ def _reached_from(cycle: Cycle, x: np.ndarray, mesh: Mesh, tolerance: float) -> 
     for count in range(_MOST_PERIODS):
         mapped, mesh = yield from _accurate_period_map(cycle, x, mesh, tolerance)
         x = mapped.states[:, -1].copy()
-        x[:3], x[WORK] = 0.0, 0.0
+        x[POSE], x[WORK] = 0.0, 0.0
         change, before = cycle.size(mapped.dynamic - before), mapped.dynamic
         settled = settled + 1 if change < goal else 0
         if settled < _QUIET_PERIODS:

@@ -12,6 +12,7 @@ import numpy as np
 
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait, check_gait
+from srs_opt.model.state import HEADING, POSE
 from srs_opt.orbit.actuators import actuator_multiplier
 from srs_opt.orbit.body import body_over_cycle, integrator
 from srs_opt.orbit.motion import CycleMotion, cycle_motion
@@ -226,7 +227,7 @@ def orbit_of(run: Integrator, gait: Gait, solution: PeriodicSolution) -> Orbit:
     p = run.pack(gait.pressure_kpa, gait.frequency_hz)
     time_s = np.concatenate([[0.0], np.cumsum(solution.mesh.h_s)])
     states = np.concatenate([solution.start[:, None], solution.states], axis=1)
-    pose, kappa = states[:3].T, states[run.layout.kappa].T
+    pose, kappa = states[POSE].T, states[run.layout.kappa].T
     # the delay of the valves shifts the whole cycle in time and changes nothing else
     motion = cycle_motion(*body_over_cycle(run, time_s, pose, kappa), robot.body_width_m)
     multipliers = np.linalg.eigvals(solution.monodromy)
@@ -252,6 +253,6 @@ def travelling(robot: Robot, gait: Gait, model: str | None = None) -> np.ndarray
     state = orbit.solution.start.copy()
     dx, dy, turn = orbit.motion.displacement
     course = math.atan2(dy, dx) - turn / 2 + (math.pi if orbit.speed_m_s < 0 else 0.0)
-    state[:3] = 0.0, 0.0, state[2] - course
+    state[POSE] = 0.0, 0.0, state[HEADING] - course
     state[WORK] = 0.0
     return state

@@ -109,7 +109,7 @@ class Integrator:
     def rest(self, x_m: float = 0.0, y_m: float = 0.0, heading_rad: float = 0.0) -> np.ndarray:
         """Return the state of the straight robot at rest, its centre of mass at (x, y)."""
         state = np.zeros(self.states)
-        state[:3] = x_m, y_m, heading_rad
+        state[POSE] = x_m, y_m, heading_rad
         return state
 
     def steps(
@@ -124,7 +124,7 @@ class Integrator:
         """
         return run_one(self.stepping(x, mesh, valve, p))
 
-    def run(self, timeline: Timeline, x: np.ndarray, tolerance: float = TOLERANCE_M_S) -> Trajectory:
+    def integrate(self, timeline: Timeline, x: np.ndarray, tolerance: float = TOLERANCE_M_S) -> Trajectory:
         """Integrate over a whole timeline from state `x` (the robot's valve delay is applied here).
 
         Raises
@@ -137,7 +137,7 @@ class Integrator:
     def travel(
         self, timeline: Timeline, x: np.ndarray, tolerance: float = TOLERANCE_M_S
     ) -> Search[Trajectory]:
-        """Do what `run` does, as a search: see `together` for many at once."""
+        """Do what `integrate` does, as a search: see `run_batched` for many at once."""
         timeline = timeline.delayed(valve_delay_s(self.robot))
         times, states, errors = [np.zeros(1)], [x[:, None]], []
         start = 0.0

@@ -108,7 +108,7 @@ def simulate(
     start = run.rest(heading_rad=heading_rad)
     timeline = Timeline.of_gait(gait, duration_s)
     started = time.perf_counter()
-    trajectory = run.run(timeline, start)
+    trajectory = run.integrate(timeline, start)
     wall = time.perf_counter() - started
     speed, turn_rate, radius = _second_half(run, trajectory, gait)
     error = _error_estimate(run, start, gait, duration_s)
@@ -124,7 +124,7 @@ def simulate_valves(
     before = compiled.compile_seconds
     run = Integrator(robot, model)
     began = time.perf_counter()
-    trajectory = run.run(timeline, run.rest() if start is None else start)
+    trajectory = run.integrate(timeline, run.rest() if start is None else start)
     wall = time.perf_counter() - began
     compile_s = compiled.compile_seconds - before
     name = model or robot.own_model
@@ -160,8 +160,8 @@ def motion_of_cycle(run: Integrator, trajectory: Trajectory, gait: Gait, cycle: 
 def _error_estimate(run: Integrator, start: np.ndarray, gait: Gait, duration_s: float) -> float | None:
     """Return the relative change of the path's length when a stretch is integrated again, finer."""
     stretch = Timeline.of_gait(gait, min(duration_s, _CHECKED_CYCLES * gait.period_s))
-    usual = run.run(stretch, start)
-    finer = run.run(stretch, start, TOLERANCE_M_S / 16)
+    usual = run.integrate(stretch, start)
+    finer = run.integrate(stretch, start, TOLERANCE_M_S / 16)
     distance = float(np.hypot(*np.diff(finer.pose[:, :2], axis=0).T).sum())
     if distance < 1e-6:
         return None

@@ -147,7 +147,7 @@ def test_fill_exhaust_asymmetry_against_an_integration_with_events():
     robot = with_effects("fill_exhaust_asymmetry")
     gait = published_wave(robot).gait()
     run = Integrator(robot)
-    path = run.run(Timeline.of_gait(gait, 1.0), run.rest())
+    path = run.integrate(Timeline.of_gait(gait, 1.0), run.rest())
     state, start, worst = np.zeros(8), 0.0, 0.0
     durations, valves = gait.phases()
     for h, valve in zip(np.tile(durations, 2), np.tile(valves, 2).T):
@@ -188,7 +188,7 @@ def test_closed_form_in_stages_equals_the_ode_with_nonlinear_effects():
 def test_all_effects_act_at_once_and_the_robot_still_moves():
     robot = with_effects(*LISTED)
     run = Integrator(robot)
-    path = run.run(Timeline.of_gait(published_wave(robot).gait(), 1.0), run.rest())
+    path = run.integrate(Timeline.of_gait(published_wave(robot).gait(), 1.0), run.rest())
     assert np.isfinite(path.pose).all()
     assert np.hypot(*path.pose[-1, :2]) > 0.01
 
@@ -242,8 +242,8 @@ def test_dead_time_holds_the_valves_at_zero_and_then_shifts_them():
         expected = np.zeros(4) if t < 0.05 else at(t - 0.05, timeline)
         np.testing.assert_array_equal(at(t, late), expected)
     run, plain = Integrator(robot), Integrator(wpi_srs())
-    delayed = run.run(timeline, run.rest())
-    prompt = plain.run(timeline.until(0.95), plain.rest())
+    delayed = run.integrate(timeline, run.rest())
+    prompt = plain.integrate(timeline.until(0.95), plain.rest())
     np.testing.assert_allclose(delayed.final[:6], prompt.final[:6], atol=2e-4)
     np.testing.assert_allclose(delayed.kappa[-1], prompt.kappa[-1], rtol=1e-9)
 
@@ -251,7 +251,7 @@ def test_dead_time_holds_the_valves_at_zero_and_then_shifts_them():
 def test_bias_acts_from_time_zero_and_is_not_divided_by_the_bending_resistance():
     robot = with_effects("curvature_bias", "bending_resistance")
     run = Integrator(robot)
-    path = run.run(Timeline.vent(4, 3.0, 55.0), run.rest())
+    path = run.integrate(Timeline.vent(4, 3.0, 55.0), run.rest())
     np.testing.assert_allclose(path.kappa[-1], 1.2, rtol=1e-9)
 
 

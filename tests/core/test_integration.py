@@ -103,7 +103,7 @@ def test_agrees_with_radau_across_switches(model, smoothing):
             rtol=1e-8,
             atol=1e-10,
         ).y[:, -1]
-    ours = run.run(Timeline.of_gait(gait, gait.period_s), run.rest(), 1e-7).final
+    ours = run.integrate(Timeline.of_gait(gait, gait.period_s), run.rest(), 1e-7).final
     np.testing.assert_allclose(ours[BODY_STATES:], state_now[BODY_STATES:], rtol=1e-5, atol=1e-6)
     np.testing.assert_allclose(ours[:3], state_now[:3], atol=3e-6)
     np.testing.assert_allclose(ours[3:5], state_now[3:5], atol=1e-5)
@@ -124,7 +124,7 @@ def test_tolerance_tells_how_exact_the_steady_speed_is():
 def test_steps_end_at_switches_and_errors_are_reported():
     gait = Wave(1.3, 50, (0.1, 1.0, 1.9, 3.0), (0.3, 0.0, 0.2, 0.1)).gait()
     run = Integrator(wpi_srs())
-    path = run.run(Timeline.of_gait(gait, 3.0), run.rest())
+    path = run.integrate(Timeline.of_gait(gait, 3.0), run.rest())
     assert path.time_s[-1] == pytest.approx(3.0)
     assert (np.diff(path.time_s) > 0).all()
     for k in range(3):
@@ -181,7 +181,7 @@ def test_energy_balance_along_a_simulated_trajectory():
 
 def test_friction_work_never_falls():
     run = Integrator(wpi_srs())
-    path = run.run(Timeline.of_gait(published_wave(wpi_srs()).gait(), 2.0), run.rest())
+    path = run.integrate(Timeline.of_gait(published_wave(wpi_srs()).gait(), 2.0), run.rest())
     assert (np.diff(path.work_j) >= -1e-12).all()
 
 
@@ -191,15 +191,15 @@ def test_start_and_stop():
     gait = published_wave(robot).gait()
     run = Integrator(robot)
     stop = Timeline.join([Timeline.of_gait(gait, 2.0), Timeline.vent(4, 2.0, gait.pressure_kpa)])
-    path = run.run(stop, run.rest())
+    path = run.integrate(stop, run.rest())
     running = path.time_s < 2.0
     assert abs(path.velocity[running, :2]).max() > 0.1
     assert abs(path.velocity[-1, :2]).max() < 1e-4
     assert abs(path.kappa[-1]).max() < 1e-8
     late = path.time_s > 3.5
     assert np.ptp(path.pose[late, :2], axis=0).max() < 1e-4
-    again = run.run(Timeline.of_gait(gait, 2.0), path.final)
-    first = run.run(Timeline.of_gait(gait, 2.0), run.rest())
+    again = run.integrate(Timeline.of_gait(gait, 2.0), path.final)
+    first = run.integrate(Timeline.of_gait(gait, 2.0), run.rest())
     turn = path.pose[-1, 2]
     moved = again.pose[-1, :2] - again.pose[0, :2]
     back = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]]) @ moved
@@ -210,14 +210,14 @@ def test_venting_from_a_running_gait_brings_it_to_rest():
     robot = wpi_srs()
     run = Integrator(robot)
     orbit = steady_gait(robot, published_wave(robot).gait())
-    path = run.run(Timeline.vent(4, 1.0, 55.0), orbit.solution.start)
+    path = run.integrate(Timeline.vent(4, 1.0, 55.0), orbit.solution.start)
     assert abs(path.kappa).max() <= 0.35 * 55.0
     assert abs(path.velocity[-1, :2]).max() < 1e-4
 
 
 def test_vented_at_rest_stays_at_rest():
     run = Integrator(wpi_srs())
-    path = run.run(Timeline.vent(4, 1.0, 55.0), run.rest(1.0, 2.0, 3.0))
+    path = run.integrate(Timeline.vent(4, 1.0, 55.0), run.rest(1.0, 2.0, 3.0))
     np.testing.assert_allclose(path.pose[-1], [1, 2, 3], atol=1e-12)
 
 
@@ -226,7 +226,7 @@ def test_a_motion_that_is_not_finite_is_an_answer_in_words():
     x = run.rest()
     x[3] = np.nan
     with pytest.raises(NoAnswerError, match="stops being finite"):
-        run.run(Timeline.vent(4, 0.1, 55.0), x)
+        run.integrate(Timeline.vent(4, 0.1, 55.0), x)
 
 
 def test_meshes_cover_their_phases_whatever_the_errors():

@@ -31,7 +31,7 @@ def test_agrees_with_thirty_simulated_periods(model, offset):
     robot, gait = wpi_srs(), Wave.uniform(4, 2, 50, 1.1, offset).gait()
     orbit = steady_gait(robot, gait, model)
     run = Integrator(robot, model)
-    path = run.run(Timeline.of_gait(gait, 30 * gait.period_s), run.rest())
+    path = run.integrate(Timeline.of_gait(gait, 30 * gait.period_s), run.rest())
     at = [np.argmin(abs(path.time_s - k * gait.period_s)) for k in range(10, 31)]
     pose = path.pose[at]
     turn = np.diff(pose[:, 2])
@@ -88,7 +88,7 @@ def test_curvature_repeats_and_has_the_closed_form():
     act = periodic_actuators(run, FREE, p)
     orbit = steady_gait(robot, FREE)
     np.testing.assert_allclose(orbit.solution.states[BODY_STATES:, -1], act, rtol=1e-9)
-    path = run.run(Timeline.of_gait(FREE, 8 / 1.7), run.rest())
+    path = run.integrate(Timeline.of_gait(FREE, 8 / 1.7), run.rest())
     np.testing.assert_allclose(path.kappa[-1], act[:4], rtol=1e-9)
 
 
@@ -119,7 +119,7 @@ def test_mirrored_wave_mirrors_the_simulated_trajectory():
     run = Integrator(robot)
     wave = Wave(2.0, 55, (0.2, 1.5, 2.5, 4.0), (0.3, 0.1, 0.2, 0.4))
     mirror = Wave(2.0, 55, tuple(b + math.pi for b in wave.phase_rad), tuple(-o for o in wave.offset))
-    paths = [run.run(Timeline.of_gait(w.gait(), 2.0), run.rest(), 3e-7) for w in (wave, mirror)]
+    paths = [run.integrate(Timeline.of_gait(w.gait(), 2.0), run.rest(), 3e-7) for w in (wave, mirror)]
     np.testing.assert_allclose(paths[1].final[:3], paths[0].final[:3] * [1, -1, -1], atol=1e-5)
     np.testing.assert_allclose(paths[1].kappa[-1], -paths[0].kappa[-1], rtol=1e-9)
 
@@ -128,8 +128,8 @@ def test_trajectory_moves_and_turns_with_its_start():
     robot = wpi_srs()
     run = Integrator(robot)
     timeline = Timeline.of_gait(FREE, 2.0)
-    here = run.run(timeline, run.rest())
-    there = run.run(timeline, run.rest(2.0, -3.0, 1.2))
+    here = run.integrate(timeline, run.rest())
+    there = run.integrate(timeline, run.rest(2.0, -3.0, 1.2))
     turn = np.array([[np.cos(1.2), -np.sin(1.2)], [np.sin(1.2), np.cos(1.2)]])
     np.testing.assert_allclose(there.pose[:, :2], here.pose[:, :2] @ turn.T + [2, -3], atol=1e-9)
     np.testing.assert_allclose(there.pose[:, 2], here.pose[:, 2] + 1.2, atol=1e-9)

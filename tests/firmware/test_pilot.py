@@ -153,7 +153,7 @@ def test_the_observer_finds_offset_drift_and_latency():
     robot = wpi_srs()
     chain, run = chain_of(robot), integrator(wpi_srs(), "complex")
     gait = contest(1, 0.36).problem.gaits.gaits[0].gait
-    motion = run.run(Timeline.of_gait(gait, gait.period_s), run.rest())
+    motion = run.integrate(Timeline.of_gait(gait, gait.period_s), run.rest())
     rng = np.random.default_rng(1)
     offset, drift, late = np.array([0.004, -0.003, 0.05]), np.array([0.03, 0.01, -0.1]), 0.03
     sightings = []

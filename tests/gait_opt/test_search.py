@@ -64,7 +64,7 @@ def test_fastest_gait_holds_up_in_a_simulation_from_rest(fastest):
     pairs = tuple(((s["on_s"], s["off_s"]),) for s in answer["switches"])
     gait = Gait(1 / answer["frequency_hz"], answer["pressure_kpa"], pairs)
     run = Integrator(ROBOT)
-    path = run.run(Timeline.of_gait(gait, 30 * gait.period_s), run.rest())
+    path = run.integrate(Timeline.of_gait(gait, 30 * gait.period_s), run.rest())
     late = np.searchsorted(path.time_s, [20 * gait.period_s - 1e-9, 30 * gait.period_s - 1e-9])
     travelled = np.hypot(*(path.pose[late[1]] - path.pose[late[0]])[:2])
     assert travelled / (10 * gait.period_s) == pytest.approx(answer["speed_m_s"], rel=2e-3)
@@ -375,8 +375,8 @@ def test_gaits_in_step_change_without_a_jerk():
     def way(following):
         timeline = Timeline.of_gait(straight, 15 * straight.period_s)
         run = integrator(ROBOT)
-        state = run.run(timeline, run.rest()).final
-        after = run.run(Timeline.of_gait(following, 2 * following.period_s), state)
+        state = run.integrate(timeline, run.rest()).final
+        after = run.integrate(Timeline.of_gait(following, 2 * following.period_s), state)
         return np.hypot(*np.diff(after.pose[:, :2], axis=0).T).sum()
 
     out_of_step = [way(turning.later(part * turning.period_s)) for part in (0.25, 0.75)]

@@ -20,7 +20,7 @@ def simulated(robot, segment, pressure, sharp=1e-5):
     run = Integrator(robot.with_values(friction_speed_m_s=sharp))
     valve = np.zeros((robot.segments, 1))
     valve[segment - 1] = 1.0
-    path = run.run(Timeline.constant(np.array([0.8]), valve, pressure, 1e-9), run.rest(), 1e-6)
+    path = run.integrate(Timeline.constant(np.array([0.8]), valve, pressure, 1e-9), run.rest(), 1e-6)
     return tuple(np.interp(TIMES, path.time_s, row[:, segment - 1]) for row in (path.no_load, path.kappa))
 
 
@@ -53,7 +53,7 @@ def test_steps_on_the_ground_are_those_of_an_independent_program(stiffness):
     loss, delay = KNOWN[stiffness]
     run = Integrator(wpi_srs().with_values(bending_stiffness_n_m2=stiffness, friction_speed_m_s=2e-5))
     valve = np.array([[0.0], [1.0], [0.0], [0.0]])
-    path = run.run(Timeline.constant(np.array([1.0]), valve, 62.0, 1e-9), run.rest(), 3e-6)
+    path = run.integrate(Timeline.constant(np.array([1.0]), valve, 62.0, 1e-9), run.rest(), 3e-6)
     late = path.time_s >= 0.5
     kappa, free = path.kappa[:, 1], path.no_load[:, 1]
     mean = [np.trapezoid(k[late], path.time_s[late]) for k in (kappa, free)]

@@ -163,7 +163,7 @@ def test_energy_balance_closes():
     """Pressure's work in; friction and material out; the rest is stored, in springs and motion."""
     robot = soft(0.005)
     run = Integrator(robot)
-    path = run.run(Timeline.of_gait(wave(offset=0.3), 1.7), run.rest(), 1e-8)
+    path = run.integrate(Timeline.of_gait(wave(offset=0.3), 1.7), run.rest(), 1e-8)
     parameters, m, _ = build(run.structure)
     velocity = ca.SX.sym("velocity", 3)
     outputs = [
@@ -196,7 +196,7 @@ def test_energy_only_falls_without_pressure():
         [m.elastic_energy() + m.kinetic_energy(velocity)],
     )
     s = oracle.random_state(np.random.default_rng(3), 5)
-    path = run.run(Timeline.vent(4, 1.0, 50.0), _start(run, s))
+    path = run.integrate(Timeline.vent(4, 1.0, 50.0), _start(run, s))
     e = energy(path.kappa.T, path.no_load.T, path.velocity.T, path.dkappa.T, run.pack(50.0, 1.0))
     e = np.asarray(e).ravel()
     assert (np.diff(e) <= 1e-7 * e[0]).all()
@@ -205,7 +205,7 @@ def test_energy_only_falls_without_pressure():
 
 def test_moving_and_turning_the_frame_changes_nothing():
     run, timeline = Integrator(soft(0.005)), Timeline.of_gait(wave(offset=0.4), 2.0)
-    here, there = (run.run(timeline, run.rest(*place)) for place in ((), (3.0, -2.0, 1.1)))
+    here, there = (run.integrate(timeline, run.rest(*place)) for place in ((), (3.0, -2.0, 1.1)))
     c, s = math.cos(1.1), math.sin(1.1)
     x, y, heading = here.pose.T
     np.testing.assert_allclose(there.pose[:, 0], 3 + c * x - s * y, atol=1e-10)
@@ -217,7 +217,7 @@ def test_mirrored_valves_mirror_the_motion():
     run = Integrator(soft(0.003))
     timeline = Timeline.of_gait(wave(offset=0.4), 2.0)
     other = Timeline(timeline.duration_s, -timeline.valve, timeline.pressure_kpa, timeline.frequency_hz)
-    here, there = run.run(timeline, run.rest()), run.run(other, run.rest())
+    here, there = run.integrate(timeline, run.rest()), run.integrate(other, run.rest())
     np.testing.assert_allclose(there.pose, here.pose * [1, -1, -1], atol=1e-10)
     np.testing.assert_allclose(there.kappa, -here.kappa, atol=1e-8)
 
@@ -225,11 +225,11 @@ def test_mirrored_valves_mirror_the_motion():
 def test_stiffer_bodies_converge_to_the_complex_model_at_first_order():
     timeline = Timeline.of_gait(wave(), 1.0)
     rigid = Integrator(wpi_srs())
-    exact = rigid.run(timeline, rigid.rest(), 1e-7).pose[-1]
+    exact = rigid.integrate(timeline, rigid.rest(), 1e-7).pose[-1]
     gaps = []
     for stiffness in (1.0, 4.0, 16.0, 64.0):
         run = Integrator(soft(stiffness))
-        gaps.append(np.linalg.norm(run.run(timeline, run.rest(), 1e-7).pose[-1] - exact))
+        gaps.append(np.linalg.norm(run.integrate(timeline, run.rest(), 1e-7).pose[-1] - exact))
     orders = np.log(np.divide(gaps[:-1], gaps[1:])) / math.log(4)
     assert orders[-1] == pytest.approx(1.0, abs=0.1), (gaps, orders)
     assert gaps[-1] < 1e-4
@@ -257,7 +257,7 @@ def _moments(run, timeline, path, p):
 def test_loss_of_bend_to_first_order_in_the_flexibility():
     """kappa = kappa0 - d with t_r d' + d = M/EI, M the rigid model's bending moment on kappa0."""
     timeline, rigid = Timeline.of_gait(wave(), 0.6), Integrator(wpi_srs())
-    free = rigid.run(timeline, rigid.rest(), 1e-8)
+    free = rigid.integrate(timeline, rigid.rest(), 1e-8)
     moments = _moments(rigid, timeline, free, rigid.pack(55.0, 2.0))
     times = np.linspace(0, 0.6, 6001)
     drive = np.stack([np.interp(times, free.time_s, column) for column in moments.T], axis=1)
@@ -267,7 +267,7 @@ def test_loss_of_bend_to_first_order_in_the_flexibility():
     errors, late = [], times > 0.1
     for stiffness in (0.5, 4.0):
         run = Integrator(soft(stiffness))
-        path = run.run(timeline, run.rest(), 1e-8)
+        path = run.integrate(timeline, run.rest(), 1e-8)
         columns = (path.no_load - path.kappa).T * stiffness
         lost = np.stack([np.interp(times, path.time_s, column) for column in columns], axis=1)
         errors.append(np.sqrt(np.mean((lost - d)[late] ** 2) / np.mean(d[late] ** 2)))
@@ -286,7 +286,7 @@ LAST = 15
 
 def last_cycles(robot, gait):
     run = Integrator(robot)
-    path = run.run(Timeline.of_gait(gait, (LAST + 5) * gait.period_s), run.rest())
+    path = run.integrate(Timeline.of_gait(gait, (LAST + 5) * gait.period_s), run.rest())
     return [motion_of_cycle(run, path, gait, k) for k in range(LAST, LAST + 5)]
 
 
@@ -315,7 +315,8 @@ def test_gaps_are_springs_in_series():
     both = soft(0.008, gap_stiffness_n_m2=0.008 * gap / l)
     timeline = Timeline.of_gait(wave(), 1.0)
     ends = [
-        (run := Integrator(robot)).run(timeline, run.rest()).pose[-1] for robot in (soft(0.004), gaps, both)
+        (run := Integrator(robot)).integrate(timeline, run.rest()).pose[-1]
+        for robot in (soft(0.004), gaps, both)
     ]
     np.testing.assert_allclose(ends[1], ends[0], rtol=1e-8)
     np.testing.assert_allclose(ends[2], ends[0], rtol=1e-8)

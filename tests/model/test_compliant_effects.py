@@ -44,7 +44,7 @@ def affected(names, larger=None, **changes):
 
 def motion(robot, seconds=0.8):
     run = Integrator(robot)
-    return run.run(Timeline.of_gait(GAIT, seconds), run.rest(0.1, -0.2, 0.3), 1e-6)
+    return run.integrate(Timeline.of_gait(GAIT, seconds), run.rest(0.1, -0.2, 0.3), 1e-6)
 
 
 @pytest.mark.parametrize("kind", GROUPS)
@@ -72,7 +72,7 @@ def test_steady_gaits_with_nonlinear_actuators():
     robot = affected(GROUPS["nonlinear actuators"], bending_stiffness_n_m2=0.005)
     orbit = steady_gait(robot, GAIT)
     run, period = Integrator(robot), GAIT.period_s
-    path = run.run(Timeline.of_gait(GAIT, 25 * period), run.rest())
+    path = run.integrate(Timeline.of_gait(GAIT, 25 * period), run.rest())
     start, end = path.pose[np.searchsorted(path.time_s, [24 * period - 1e-9, 25 * period - 1e-9])]
     way = np.hypot(*orbit.motion.displacement[:2])
     assert np.hypot(*(end - start)[:2]) == pytest.approx(way, rel=5e-3)

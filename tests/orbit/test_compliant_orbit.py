@@ -38,7 +38,7 @@ def test_the_orbit_is_where_a_standing_start_ends(name, stiffness):
     robot, gait = soft(stiffness), waves()[name].gait()
     orbit = steady_gait(robot, gait)
     run = Integrator(robot)
-    path = run.run(Timeline.of_gait(gait, 60 * gait.period_s), run.rest())
+    path = run.integrate(Timeline.of_gait(gait, 60 * gait.period_s), run.rest())
     last = motion_of_cycle(run, path, gait, 59)
     assert orbit.speed_m_s == pytest.approx(last.speed_m_s, rel=2e-3)
     assert orbit.turn_rate_rad_s == pytest.approx(last.turn_rate_rad_s, rel=2e-3, abs=1e-3)

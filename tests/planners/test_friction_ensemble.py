@@ -17,7 +17,7 @@ def driven(problem, true_robot, cycles=4):
     cycle = Timeline.of_gait(gait, gait.period_s)
     state = run.rest(problem.start.x, problem.start.y, problem.start.heading)
     for _ in range(cycles):
-        before, state = state, run.run(cycle, state).final
+        before, state = state, run.integrate(cycle, state).final
         ensemble.learn(problem.as_planned(before), cycle, problem.as_planned(state))
     return ensemble, cycle, problem.as_planned(state)
 
@@ -28,7 +28,7 @@ def test_unknown_friction_is_any(problem_in):
     gait = problem.gaits["fast"].gait
     ahead = Timeline.of_gait(gait, 3 * gait.period_s)
     start = problem.start
-    state = problem.run.rest(start.x, start.y + 0.02, 0.15)
+    state = problem.integrator.rest(start.x, start.y + 0.02, 0.15)
     rooms = [ensemble.room_m(state, ahead, k) for k in range(len(FRICTIONS))]
     assert max(rooms) - min(rooms) > 1e-4
     assert ensemble.least_room_m(state, ahead) == pytest.approx(min(rooms), abs=1e-12)

@@ -18,7 +18,7 @@ def before_wall(problem_in, robot):
     def build(ahead_m):
         length = 1.0 + robot.length_m / 2 + ahead_m
         problem = problem_in(maze_of((0, 0, length, 0.6), (0.4, 0.3, 0.0), (0.6, 0.3, 0.05), []))
-        state = problem.run.rest(1.0, 0.3, 0.0)
+        state = problem.integrator.rest(1.0, 0.3, 0.0)
         state[3] = SPEED_M_S
         return problem, state
 

@@ -147,7 +147,7 @@ def test_wider_beams_are_not_slower(problem_in):
 
 def test_cycles_side_by_side_are_those_alone(problem_in):
     problem = problem_in(corridor(0.3))
-    state = problem.run.rest(0.3, 0.15, 0.1)
+    state = problem.integrator.rest(0.3, 0.15, 0.1)
     together = problem.simulate_all(
         [(state, problem.motion.rest, gait) for gait in range(problem.motion.size)]
     )

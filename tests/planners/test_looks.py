@@ -27,7 +27,7 @@ def moved(state, rng, t, speed=True):
 
 
 def room_of(problem, trajectory):
-    lines = body_in_room(centre_lines(problem.run, trajectory.kappa), trajectory.pose)
+    lines = body_in_room(centre_lines(problem.integrator, trajectory.kappa), trajectory.pose)
     arrived = arrival_index(problem.goal, trajectory.pose)
     return float(problem.body.exact(lines[: None if arrived is None else arrived + 1]).min())
 
@@ -41,7 +41,7 @@ def test_every_cycle_keeps_clear_from_wherever_a_look_may_find_it(solved):
         timeline = problem.joints.timeline(before, gait)
         for _ in range(6):
             begun = moved(state, rng, found.tolerance, speed=k > 0)
-            least = min(least, room_of(problem, problem.run.run(timeline, begun)))
+            least = min(least, room_of(problem, problem.integrator.integrate(timeline, begun)))
         before = gait
     assert found.closed_loop_m - 2e-4 < least < found.closed_loop_m + 0.003
 
@@ -54,7 +54,7 @@ def test_without_looks_a_heading_moves_the_far_end(solved):
     for _ in range(8):
         state, before = moved(root.state, rng, rough), root.gait
         for gait in plan.gaits:
-            trajectory = problem.run.run(problem.joints.timeline(before, gait), state)
+            trajectory = problem.integrator.integrate(problem.joints.timeline(before, gait), state)
             least = min(least, room_of(problem, trajectory))
             state, before = trajectory.final, gait
     assert least >= found.open_loop_m - 2e-4

@@ -15,7 +15,7 @@ def drive(robot, motion, order):
     run = integrator(robot)
     state, before = run.rest(), motion.rest
     for now in order:
-        after = run.run(motion.joints.timeline(before, now), state).final
+        after = run.integrate(motion.joints.timeline(before, now), state).final
         yield state, before, now, after
         state, before = after, now
 

@@ -57,13 +57,13 @@ def test_slopes_are_those_of_finer_simulations(planned):
     numbers = (problem.motion.rest, *plan.gaits)
     joints = [problem.joints.joint(a, b) for a, b in pairwise(numbers[:4])]
     window = Window.of_cycles(joints, problem.joints.limits)
-    (shot,) = shoot_windows(problem.run, start, [window])
-    slopes = with_slopes(problem.run, start, shot).slopes[-1][:3]
+    (shot,) = shoot_windows(problem.integrator, start, [window])
+    slopes = with_slopes(problem.integrator, start, shot).slopes[-1][:3]
     x = window.unknowns()
     for column in range(1, window.size, 4):
         by = 1e-4 if column < window.size - window.cycles else 0.05
         moved = [window.moved(x + sign * by * np.eye(window.size)[column]) for sign in (1, -1)]
-        a, b = (problem.run.run(w.timeline(), start, 1e-7).final[:3] for w in moved)
+        a, b = (problem.integrator.integrate(w.timeline(), start, 1e-7).final[:3] for w in moved)
         exact = (a - b) / (2 * by)
         assert np.abs(slopes[:, column] - exact).max() < 0.05 * np.abs(exact).max() + 2e-3
 

@@ -42,7 +42,7 @@ def test_a_plan_is_the_motion_of_the_soft_body(soft_problem):
     run, start = Integrator(soft_problem.robot), soft_problem.start
     gaits = [soft_problem.gaits.gaits[k].gait for k in plan.gaits]
     line = Timeline.join([Timeline.of_gait(g, g.period_s) for g in gaits])
-    path = run.run(line, run.rest(start.x, start.y, start.heading))
+    path = run.integrate(line, run.rest(start.x, start.y, start.heading))
     for time, pose in zip(plan.certificate.time_s[::50], plan.certificate.pose[::50]):
         place, _ = path.at(np.array([time]))
         np.testing.assert_allclose(pose, place[0], atol=2e-3)
@@ -95,7 +95,7 @@ def test_other_robots_under_a_soft_plan_never_touch(soft_problem, stiffness):
 def test_states_are_carried_between_models(soft_problem, problem_in):
     run, rigid = soft_problem.run, problem_in(corridor(0.3, 2.0))
     gait = soft_problem.gaits.gaits[0].gait
-    state = run.run(Timeline.of_gait(gait, 3.2 * gait.period_s), run.rest()).final
+    state = run.integrate(Timeline.of_gait(gait, 3.2 * gait.period_s), run.rest()).final
     adopted = rigid.as_planned(state, run)
     assert adopted.shape == (rigid.run.states,)
     np.testing.assert_array_equal(adopted[rigid.run.layout.kappa], state[run.layout.actuator][:4])

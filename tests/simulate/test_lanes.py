@@ -94,7 +94,7 @@ def test_the_models_step_agrees_with_the_interpreter():
     step = step_function(Structure.of(wpi_srs()))
     gait = published_wave(wpi_srs(), 2, 55, 0.4).gait()
     p = run.pack(55, 2)
-    path = run.run(Timeline.of_gait(gait, 0.7), run.rest())
+    path = run.integrate(Timeline.of_gait(gait, 0.7), run.rest())
     x, valve = path.final, gait.valve(0.2)
     (got, error) = run.kernel.run([Course(x, np.full(3, 2e-3), np.tile(valve, (3, 1)), p)])
     for k in range(3):
@@ -122,7 +122,7 @@ def test_simulations_side_by_side_are_the_same_as_alone():
     ]
     paths = run_batched([run.travel(line, run.rest()) for line in lines])
     for path, line in zip(paths, lines):
-        assert np.array_equal(path.pose, run.run(line, run.rest()).pose)
+        assert np.array_equal(path.pose, run.integrate(line, run.rest()).pose)
 
 
 def test_searches_that_want_nothing_do_not_stop_the_others():

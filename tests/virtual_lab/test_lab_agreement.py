@@ -29,7 +29,7 @@ def compare(effects, tolerance_m, **robot_values):
     start = run(truth, TRIAL, np.zeros(1)).centre_of_mass()[0]
     integrator = Integrator(robot)
     timeline = Timeline.of_gait(published_wave(robot, 2.0, 55.0, 0.4).gait(), DURATION_S)
-    model = integrator.run(timeline, integrator.rest(*start, 0.0), 1e-6)
+    model = integrator.integrate(timeline, integrator.rest(*start, 0.0), 1e-6)
     lab = run(truth, TRIAL, model.time_s)
     np.testing.assert_allclose(lab.centre_of_mass(), model.pose[:, :2], atol=tolerance_m)
     np.testing.assert_allclose(lab.theta.mean(axis=1), model.pose[:, 2], atol=10 * tolerance_m)
