@@ -93,7 +93,7 @@ def test_other_robots_under_a_soft_plan_never_touch(soft_problem, stiffness):
 
 
 def test_states_are_carried_between_models(soft_problem, problem_in):
-    run, rigid = soft_problem.run, problem_in(corridor(0.3, 2.0))
+    run, rigid = soft_problem.integrator, problem_in(corridor(0.3, 2.0))
     gait = soft_problem.gaits.gaits[0].gait
     state = run.integrate(Timeline.of_gait(gait, 3.2 * gait.period_s), run.rest()).final
     adopted = rigid.as_planned(state, run)
