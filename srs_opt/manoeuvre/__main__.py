@@ -74,6 +74,13 @@ def build_parser() -> Parser:
     )
     add_valve_limits(parser)
     add("--starts", type=positive_int, default=8, metavar="N", help="starts that are optimized (default 8)")
+    add(
+        "--populations",
+        type=seed_number,
+        default=2,
+        metavar="N",
+        help="populations of waves that change on the way, 10 to 30 s each (default 2)",
+    )
     add("--shakes", type=seed_number, default=24, metavar="N", help="perturbed optima tried (default 24)")
     return parser
 
@@ -100,7 +107,14 @@ def run(options: argparse.Namespace) -> Answer:
     task = _task(options, run, robot, model)
     gaits = [entry.gait for entry in _table(options, robot, model).gaits]
     found = find(
-        run, task, gaits, options.starts, options.shakes, options.seed, lambda text: say(options, text)
+        run,
+        task,
+        gaits,
+        options.starts,
+        options.populations,
+        options.shakes,
+        options.seed,
+        lambda text: say(options, text),
     )
     record = record_of(run, task, found)
     files = [write_json(options.out / "manoeuvre.json", record)]

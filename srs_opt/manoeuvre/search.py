@@ -9,6 +9,7 @@ import numpy as np
 
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait
+from srs_opt.manoeuvre.breeding import bred
 from srs_opt.manoeuvre.certificate import Certificate, certify
 from srs_opt.manoeuvre.solve import SATISFIED_M, Candidate, Solver, smoothed
 from srs_opt.manoeuvre.starts import playable, starts
@@ -59,6 +60,7 @@ def find(
     task: Task,
     gaits: Sequence[Gait],
     count: int = 8,
+    populations: int = 2,
     shakes: int = 24,
     seed: int = 0,
     tell: Tell = lambda message: None,
@@ -70,8 +72,9 @@ def find(
     run : Integrator
     gaits : sequence of Gait
         Tried as starts beside random waves.
-    count, shakes : int
-        Starts that are optimized, and perturbations of the best optima that are optimized again.
+    count, populations, shakes : int
+        Steady waves that are optimized, populations of waves that change on the way, and perturbations of the
+        best optima that are optimized again.
 
     Raises
     ------
@@ -79,7 +82,8 @@ def find(
         If nothing that reaches the end is found.
     """
     solver = Solver(run, task)
-    begun = starts(Solver(run, task, ROUGH_STEP_S), gaits, count, seed)
+    rough = Solver(run, task, ROUGH_STEP_S)
+    begun = starts(rough, gaits, count, seed)
     if not begun:
         raise NoAnswerError("no wave gait comes near the end of this manoeuvre; allow more time (--longest)")
     soft = Solver(smoothed(run, COARSE_FRICTION_M_S), task, ROUGH_STEP_S)
@@ -90,6 +94,10 @@ def find(
         tell(
             f"start {k + 1} of {len(begun)}: {start.plan.duration_s:.3f} s -> {_word(min(pool, key=_merit))}"
         )
+    for k in range(populations):
+        population = bred(rough, begun[0], seed + k)
+        pool.append(solver.solve(population.plan, FIRST_STEPS))
+        tell(f"population {k + 1} of {populations}: {_word(population)} -> {_word(pool[-1])}")
     pool = sorted(pool, key=_merit)[:POOL]
     pool[0] = solver.solve(pool[0].plan, LAST_STEPS)
     rng = np.random.default_rng(seed)
@@ -112,7 +120,7 @@ def find(
             f"nothing found reaches the end: the best misses by {1e3 * final.worst_m:.0f} mm; "
             "allow more time (--longest), room or pressure, or try more --starts"
         )
-    solves = 2 * len(begun) + 1 + shakes
+    solves = 2 * len(begun) + populations + 1 + shakes
     return Manoeuvre(
         final.plan,
         certificate,

@@ -53,9 +53,10 @@ class Solver:
 
     def judge(self, plans: list[ValvePlan]) -> list[Candidate]:
         """Simulate and judge manoeuvres."""
-        return [self._judged(shot) for shot in shoot(self.run, self.task.start.state, plans, self.step_s)]
+        return [self.judged(shot) for shot in shoot(self.run, self.task.start.state, plans, self.step_s)]
 
-    def _judged(self, shot: Shot) -> Candidate:
+    def judged(self, shot: Shot) -> Candidate:
+        """Judge a simulated manoeuvre."""
         radius = self._radius(shot)
         values = self.rows(shot, radius).values
         if not np.isfinite(values).all():

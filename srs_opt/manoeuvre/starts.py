@@ -13,17 +13,18 @@ from dataclasses import replace
 import numpy as np
 
 from srs_opt.gait import Gait, Wave
-from srs_opt.manoeuvre.shooting import shoot
+from srs_opt.manoeuvre.shooting import Shot, shoot
 from srs_opt.manoeuvre.solve import Candidate, Solver
 from srs_opt.manoeuvre.task import Task
 from srs_opt.manoeuvre.valves import COINCIDENT_S, ValvePlan, ValveRow, gait_end
-from srs_opt.model.state import POSE, X
+from srs_opt.model.state import HEADING, X
 
 PLANS = 960  # simulated at most, several lengths of time per wave where the end is not merely passed
 WAVES = 30  # per start that is wanted
 FREQUENCY_HZ, LAG_RAD = (1.2, 4.5), (0.6, 1.6)
 TIMES = 6  # lengths tried per wave
 FIRST_S = 0.25
+VENT_S = 0.45  # of a stop's first draft
 SETTLE_S, STAIRS = 0.1, 8  # for a change of pressure, as the planner has it
 ALIKE = 0.004  # merits of starts that are taken for the same
 
@@ -74,36 +75,42 @@ def passed(task: Task) -> bool:
 
 def _until_arrival(solver: Solver, gaits: Sequence[Gait]) -> list[ValvePlan]:
     """Return the gaits that arrive, played until they do, where the end is a line or a heading."""
-    task, end = solver.task, solver.task.end
+    task = solver.task
     if not passed(task):
         return []
     plans = []
     longest = [playable(task, lengths(task, g)[-1]) for g in gaits]
     for shot in shoot(solver.run, task.start.state, longest, solver.step_s):
-        pose = shot.states[:, POSE] - task.start.state[POSE]
-        done = np.ones(shot.time_s.size, dtype=bool)
-        for wanted, have in ((end.past_m, shot.states[:, X]), (end.turn_rad, pose[:, 2])):
-            if wanted is not None:
-                done &= np.sign(wanted) * have >= abs(wanted)
-        if done.any():
-            until = max(float(shot.time_s[done.argmax()]), FIRST_S)
-            plans.append(replace(shot.plan, duration_s=until).trimmed())
+        node = arrived(task, shot)
+        if node is not None:
+            plans.append(replace(shot.plan, duration_s=float(shot.time_s[node])).trimmed())
     return plans
+
+
+def arrived(task: Task, shot: Shot) -> int | None:
+    """Return the first node at which the line or the heading is passed, None if it never is."""
+    done = shot.time_s >= FIRST_S
+    turned = shot.states[:, HEADING] - task.start.state[HEADING]
+    for wanted, have in ((task.end.past_m, shot.states[:, X]), (task.end.turn_rad, turned)):
+        if wanted is not None:
+            done &= np.sign(wanted) * have >= abs(wanted)
+    return int(done.argmax()) if done.any() else None
 
 
 def lengths(task: Task, gait: Gait) -> list[ValvePlan]:
     """Return the gait played for several lengths of time, with what the task's start and end ask for."""
     longest = task.longest_s or _likely_s(task)
-    tail = task.end.orbit.gait if task.end.orbit is not None else None
-    plans = []
-    for played in np.geomspace(max(longest / 6, FIRST_S), longest, TIMES):
-        plan = ValvePlan.of_gaits((gait,), float(played))
-        if task.end.rest:
-            plan = vented(plan, 0.45)
-        if tail is not None:
-            plan = followed(plan, tail, 2)
-        plans.append(playable(task, plan))
-    return plans
+    times = np.geomspace(max(longest / 6, FIRST_S), longest, TIMES)
+    return [with_end(task, ValvePlan.of_gaits((gait,), float(played))) for played in times]
+
+
+def with_end(task: Task, plan: ValvePlan) -> ValvePlan:
+    """Return the plan, playable, with the venting or the gait that the task's end asks for."""
+    if task.end.rest:
+        plan = vented(plan, VENT_S)
+    if task.end.orbit is not None:
+        plan = followed(plan, task.end.orbit.gait, 2)
+    return playable(task, plan)
 
 
 def _likely_s(task: Task) -> float:

@@ -19,7 +19,7 @@ from srs_opt.robot import wpi_srs
 from srs_opt.simulate.__main__ import main as simulate
 
 ROBOT = wpi_srs()
-QUICK = ["--starts", "2", "--shakes", "0", "--quiet", "--json"]
+QUICK = ["--starts", "2", "--populations", "0", "--shakes", "0", "--quiet", "--json"]
 
 
 def answer(arguments, out, capsys):

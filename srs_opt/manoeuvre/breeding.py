@@ -1,0 +1,129 @@
+"""Waves that change on the way, bred by simulation (CMA-ES): starts that no steady wave leads to.
+
+A standing start wants a frequency that rises with the speed, from about 1 to 3.5 Hz, and lags that fall: from
+a steady wave that is a move of every switch by up to a cycle, which no local step makes. So a wave of the
+paper's (13) gets a frequency that is linear between knots, and a lag and an offset that go evenly from one
+value to another; a population of such waves is judged by simulation alone. Single switches are left to the
+local optimization after it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from srs_opt.manoeuvre.shooting import shoot
+from srs_opt.manoeuvre.solve import Candidate, Solver
+from srs_opt.manoeuvre.starts import FREQUENCY_HZ, LAG_RAD, arrived, passed, with_end
+from srs_opt.manoeuvre.task import Task
+from srs_opt.manoeuvre.valves import ValvePlan, ValveRow
+
+KNOTS = 6  # of the frequency; four lose 1 % of a standing start, eight gain nothing
+SIZE = 24  # waves per generation
+GENERATIONS = 160  # a standing start gains 0.1 % in as many more
+FIRST = 10  # generations' worth of steady waves, the best of which is the population's middle
+LONGER = 1.15  # than the best steady wave: time that a population has where the end is merely passed
+INSTANTS = 1500  # at which a wave's sign is looked at
+LIMITS_HZ = (0.3, 6.0)
+SPREAD_HZ, SPREAD_LAG, SPREAD_OFFSET, SPREAD_KPA, SPREAD_TIME = 0.6, 0.3, 0.3, 6.0, 0.2
+
+
+@dataclass(frozen=True)
+class Family:
+    """Waves that change on the way, as vectors of genes.
+
+    The genes: frequency at the knots (Hz), phase at time 0, lag at begin and end (rad), offset at begin and
+    end, pressure (kPa), and the logarithm of the time for which the wave is played over `played_s`.
+    """
+
+    task: Task
+    segments: int
+    played_s: float
+
+    @property
+    def size(self) -> int:
+        """Number of genes."""
+        return KNOTS + 7
+
+    @property
+    def spread(self) -> np.ndarray:
+        """Standard deviations of a population's first generation."""
+        free = 1.0 if self.task.pressure_is_free else 1e-6
+        timed = 1e-6 if passed(self.task) else 1.0
+        rest = [1.5, *[SPREAD_LAG] * 2, *[SPREAD_OFFSET] * 2, free * SPREAD_KPA, timed * SPREAD_TIME]
+        return np.array([SPREAD_HZ] * KNOTS + rest)
+
+    def steady(self, rng: np.random.Generator) -> np.ndarray:
+        """Return the genes of a random steady wave."""
+        frequency, lag = rng.uniform(*FREQUENCY_HZ), rng.choice((-1, 1)) * rng.uniform(*LAG_RAD)
+        offset = rng.uniform(-0.95, 0.95) * rng.integers(2)
+        low, high = self.task.bounds.pressure_kpa
+        pressure = high - (high - low) * 0.4 * rng.uniform() ** 2
+        time = 0.0 if passed(self.task) else math.log(rng.uniform(0.3, 1.2))
+        phase = rng.uniform(0, 2 * math.pi)
+        return np.array([*[frequency] * KNOTS, phase, lag, lag, offset, offset, pressure, time])
+
+    def plan(self, genes: np.ndarray) -> ValvePlan:
+        """Return what the valves do, playable, with what the task's end asks for."""
+        phase, lag, later_lag, offset, later_offset, pressure, time = genes[KNOTS:]
+        played = self.played_s * math.exp(min(time, 1.0))
+        at = np.linspace(0.0, played, INSTANTS)
+        share = at / played
+        frequency = np.interp(share, np.linspace(0, 1, KNOTS), genes[:KNOTS]).clip(*LIMITS_HZ)
+        cycles = np.concatenate([[0.0], np.cumsum((frequency[1:] + frequency[:-1]) / 2 * np.diff(at))])
+        lags, offsets = lag + (later_lag - lag) * share, offset + (later_offset - offset) * share
+        rows = []
+        for segment in range(self.segments):
+            wave = np.sin(phase + 2 * math.pi * cycles + segment * lags) + offsets
+            sign = np.where(wave >= 0, 1, -1)
+            k = np.flatnonzero(sign[1:] != sign[:-1])
+            crossed = at[k] + (at[k + 1] - at[k]) * wave[k] / (wave[k] - wave[k + 1])
+            states = (int(sign[0]), *(int(s) for s in sign[k + 1]))
+            rows.append(ValveRow(states, tuple(float(t) for t in crossed)))
+        low, high = self.task.bounds.pressure_kpa
+        kpa = self.task.pressure_kpa or float(np.clip(pressure, low, high))
+        return with_end(self.task, ValvePlan(tuple(rows), played, kpa))
+
+
+def bred(solver: Solver, begun: Candidate, seed: int) -> Candidate:
+    """Return the best of a population of waves that change on the way.
+
+    Parameters
+    ----------
+    begun : Candidate
+        The best steady wave; its duration says how much time the task takes.
+    """
+    import cma
+
+    task = solver.task
+    played = begun.plan.duration_s * (LONGER if passed(task) else 1.0)
+    family = Family(task, solver.run.structure.segments, min(played, task.longest_s or math.inf))
+    rng = np.random.default_rng(seed)
+    first = [family.steady(rng) for _ in range(FIRST * SIZE)]
+    judged = _judged(solver, family, first)
+    middle = first[min(range(len(first)), key=lambda k: judged[k].merit)]
+    options = {"CMA_stds": family.spread, "popsize": SIZE, "maxiter": GENERATIONS, "seed": seed + 1}
+    strategy = cma.CMAEvolutionStrategy(middle, 1.0, {**options, "verbose": -9})
+    best = min(judged, key=lambda c: c.merit)
+    while not strategy.stop():
+        asked = strategy.ask()
+        judged = _judged(solver, family, asked)
+        # a motion that cannot be integrated ranks last
+        strategy.tell(asked, [min(c.merit, 1e6) for c in judged])
+        best = min([best, *judged], key=lambda c: c.merit)
+    return best
+
+
+def _judged(solver: Solver, family: Family, genes: list[np.ndarray]) -> list[Candidate]:
+    """Simulate waves; those whose end is a line or a heading are broken off there."""
+    shots = shoot(solver.run, solver.task.start.state, [family.plan(g) for g in genes], solver.step_s)
+    found = []
+    for shot in shots:
+        node = arrived(solver.task, shot) if passed(solver.task) else None
+        if node is not None:
+            plan = replace(shot.plan, duration_s=float(shot.time_s[node])).trimmed()
+            shot = replace(shot, plan=plan, time_s=shot.time_s[: node + 1], states=shot.states[: node + 1])
+        found.append(solver.judged(shot))
+    return found
