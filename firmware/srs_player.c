@@ -183,16 +183,21 @@ srs_fault srs_player_run(srs_player *p) {
   return accept(p, &cycle, 0u);
 }
 
+int64_t srs_distance(const srs_gait *gait, int16_t speed_mm_s, int16_t turn_rate_mrad_s) {
+  const int64_t v = 10 * ((int64_t)gait->speed_mm_s - speed_mm_s);
+  const int64_t w = (int64_t)gait->turn_rate_mrad_s - turn_rate_mrad_s; /* mrad/s on 0.1 m: 0.1 mm/s */
+  return v * v + w * w;
+}
+
 uint16_t srs_nearest(const srs_program *program, int16_t speed_mm_s, int16_t turn_rate_mrad_s) {
   uint16_t best = SRS_NONE;
-  int64_t least = 250001; /* (50 mm/s)^2 in units of 0.1 mm/s, and one: within 50 is near */
+  int64_t least = SRS_NEAR + 1;
   for (uint16_t k = 0; (k < program->gait_count) && ((speed_mm_s != 0) || (turn_rate_mrad_s != 0)); ++k) {
     srs_gait gait;
     srs_read(&gait, &program->gaits[k], (uint16_t)sizeof gait);
-    const int64_t v = 10 * ((int64_t)gait.speed_mm_s - speed_mm_s);
-    const int64_t w = (int64_t)gait.turn_rate_mrad_s - turn_rate_mrad_s; /* mrad/s on 0.1 m: 0.1 mm/s */
-    if (v * v + w * w < least) {
-      least = v * v + w * w;
+    const int64_t far = srs_distance(&gait, speed_mm_s, turn_rate_mrad_s);
+    if (far < least) {
+      least = far;
       best = k;
     }
   }

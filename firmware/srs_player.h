@@ -139,6 +139,10 @@ void srs_player_tick(srs_player *p);
  * still and where no gait is within 50 mm/s. */
 uint16_t srs_nearest(const srs_program *program, int16_t speed_mm_s, int16_t turn_rate_mrad_s);
 
+/* Squared distance of a gait's steady motion from a wanted one, in units of 0.1 mm/s, and the largest that is near. */
+int64_t srs_distance(const srs_gait *gait, int16_t speed_mm_s, int16_t turn_rate_mrad_s);
+#define SRS_NEAR 250000
+
 /* State of one segment (from 0, the tail): 1 left, -1 right, 0 vented. */
 int8_t srs_valve(const uint32_t *valves, uint8_t segment);
 

@@ -152,11 +152,7 @@ class MotionTable:
         The mean heading swings within a cycle; the direction of travel in the steady state is the chord of
         a cycle less half its turn. Gaits that back up point against their heading.
         """
-        dx, dy, turn = self.steady.T
-        backwards = self.steady_speed_m_s < 0
-        chord = np.arctan2(np.where(backwards, -dy, dy), np.where(backwards, -dx, dx))
-        moving = np.hypot(dx, dy) > STILL * self.body_width_m
-        return np.append(np.where(moving, chord - turn / 2, 0.0), 0.0)
+        return np.append(courses(self.steady, STILL * self.body_width_m), 0.0)
 
     @cached_property
     def steady_speed_m_s(self) -> Array:
@@ -164,6 +160,22 @@ class MotionTable:
         dx, dy, _ = self.steady.T
         forward = np.where(dx >= 0, 1.0, -1.0)
         return np.asarray(forward * np.hypot(dx, dy) / self.period_s)
+
+
+def courses(steady: Array, still_m: float) -> Array:
+    """Return the angles from mean heading to direction of travel at cycles' ends (n,); see `course`.
+
+    Parameters
+    ----------
+    steady : array (n, 3)
+        Displacement per cycle.
+    still_m : float
+        What moves less per cycle has no direction of travel: 0.
+    """
+    dx, dy, turn = steady.T
+    backwards = dx < 0
+    chord = np.arctan2(np.where(backwards, -dy, dy), np.where(backwards, -dx, dx))
+    return np.where(np.hypot(dx, dy) > still_m, chord - turn / 2, 0.0)
 
 
 def placed(local: Array, x: float, y: float, heading: float) -> Array:

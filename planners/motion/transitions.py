@@ -8,7 +8,6 @@ when begun at different speeds; from each of them every gait is simulated for a 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
@@ -69,21 +68,58 @@ def simulate_transitions(
         Wraps the iteration over the gaits that come before.
     """
     run = integrator(robot, table.model)
-    joints = Joints(table, limits)
-    plain = [CycleRun(run, joints.timeline(k, k), STEP_S) for k in range(len(table.gaits))]
-    n = len(plain)
+    n = len(table.gaits)
     levels = _speed_levels(table)
     speed = np.empty((n + 1, LEVELS))
     after = np.empty((n + 1, n, LEVELS))
     pose = np.empty((n + 1, n, LEVELS, SAMPLES + 1, 3))
     kappa = np.empty((n + 1, n, SAMPLES + 1, robot.segments))
-    for before in progress(range(n + 1)):
-        ends = (
-            [run.rest()] * LEVELS if before == n else _ends(run, table.gaits[before], plain[before], levels)
-        )
-        speed[before] = [state[VELOCITY][0] for state in ends]
-        starts = ends[:1] if before == n else ends
+    rows = every_cycle(run, table, limits, lambda entry: levels, progress)
+    for before, (begun, cycles) in enumerate(rows):
+        speed[before] = begun
         after[before], pose[before], kappa[before] = 0.0, 0.0, 0.0
+        for now, level, last, samples in cycles:
+            pose[before, now, level] = samples[:, :3]
+            kappa[before, now] = samples[:, run.layout.kappa]
+            after[before, now, level] = last[VELOCITY][0]
+    # from rest there is one speed only: equal levels, spaced so that they can be looked up
+    speed[n] = np.linspace(-1e-3, 1e-3, LEVELS)
+    after[n], pose[n] = after[n, :, :1], pose[n, :, :1]
+    return Transitions(speed, *(a.astype(np.float32) for a in (after, pose, kappa)))
+
+
+_Cycles = list[tuple[int, int, np.ndarray, np.ndarray]]
+
+
+def every_cycle(
+    run: Integrator,
+    table: GaitTable,
+    limits: ValveLimits,
+    levels: Callable[[TableGait], np.ndarray],
+    progress: Progress = iter,
+) -> Iterator[tuple[np.ndarray, _Cycles]]:
+    """Simulate a cycle of every gait after every gait of a table, then after rest.
+
+    Parameters
+    ----------
+    levels : callable
+        Of the gait before, the forward speeds at which its own cycle begins.
+
+    Yields
+    ------
+    speed_m_s : array (levels,)
+        Forward speeds at the begin of the cycles: that of rest is one.
+    cycles : list of (now, level, last state (nx,), samples (SAMPLES + 1, nx))
+        Of the gaits that can follow.
+    """
+    joints = Joints(table, limits)
+    n = len(table.gaits)
+    plain = [CycleRun(run, joints.timeline(k, k), STEP_S) for k in range(n)]
+    for before in progress(range(n + 1)):
+        if before == n:
+            ends = [run.rest()]
+        else:
+            ends = _ends(run, table.gaits[before], plain[before], levels(table.gaits[before]))
         following = [now for now in range(n) if joints.joint(before, now) is not None]
         cycles = [
             plain[now]
@@ -91,16 +127,10 @@ def simulate_transitions(
             else CycleRun(run, joints.timeline(before, now), STEP_S)
             for now in following
         ]
-        outcomes = iter(_all([cycle(_at_origin(start)) for cycle in cycles for start in starts]))
-        for now in following:
-            for level, (last, samples) in enumerate(islice(outcomes, len(starts))):
-                pose[before, now, level] = samples[:, :3]
-                kappa[before, now] = samples[:, run.layout.kappa]
-                after[before, now, level] = last[VELOCITY][0]
-    # from rest there is one speed only: equal levels, spaced so that they can be looked up
-    speed[n] = np.linspace(-1e-3, 1e-3, LEVELS)
-    after[n], pose[n] = after[n, :, :1], pose[n, :, :1]
-    return Transitions(speed, *(a.astype(np.float32) for a in (after, pose, kappa)))
+        outcomes = _all([cycle(_at_origin(start)) for cycle in cycles for start in ends])
+        places = [(now, level) for now in following for level in range(len(ends))]
+        found = [(*place, last, samples) for place, (last, samples) in zip(places, outcomes)]
+        yield np.array([state[VELOCITY][0] for state in ends]), found
 
 
 def motion_table(

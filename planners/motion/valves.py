@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -252,7 +252,7 @@ def playable(robot: Robot, table: GaitTable, limits: ValveLimits) -> GaitTable:
             f"{limits.tick_s:g} s; make a table for these limits: python -m srs_opt.gait_opt --table "
             "--min-dwell S --tick S"
         )
-    return table if kept == table.gaits else replace(table, gaits=kept)
+    return table if kept == table.gaits else table.with_gaits(kept)
 
 
 def _on_ticks(robot: Robot, entry: TableGait, model: str, limits: ValveLimits) -> TableGait | None:

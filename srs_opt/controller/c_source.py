@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
 
 from srs_opt.controller.program import Program
+from srs_opt.errors import InputError
 from srs_opt.files import write_text
+from srs_opt.gait_opt.table import GaitTable
 from srs_opt.gait_opt.ticks import WORD_BITS
 
 
@@ -48,13 +51,54 @@ def c_source(program: Program) -> str:
         # C99 has no empty arrays: a program without a plan has one step that nobody reads
         "STEPS": "\n".join(f"  {{{gait}u, {cycles}u}}," for gait, cycles in program.steps or ((0, 1),)),
     }
-    template = resources.files("srs_opt.controller").joinpath("program.h.in").read_text(encoding="utf-8")
-    return re.sub(r"@(\w+)@", lambda found: values[found[1]], template)
+    return _filled("program.h.in", values)
 
 
 def write_program(program: Program, path: Path) -> Path:
     """Write the program's header."""
     return write_text(path, c_source(program))
+
+
+def changes_source(program: Program, table: GaitTable) -> str:
+    """Return a C99 header that defines ``srs_changes_data``: what a cycle of a gait does after another's.
+
+    Raises
+    ------
+    InputError
+        If the table does not say.
+    """
+    changes = table.changes
+    if changes is None:
+        raise InputError(f"the gait table of robot '{table.robot_name}' does not say what changes of gait do")
+    befores = [
+        f"  {{{{{', '.join(map(str, speeds))}}}, {course}}},"
+        for speeds, course in zip(changes.speed.tolist(), changes.course.tolist())
+    ]
+    moves = [
+        f"  {{{', '.join('{' + ','.join(map(str, level)) + '}' for level in levels)}}},"
+        for row in changes.moved.tolist()
+        for levels in row
+    ]
+    values = {
+        "ROBOT": safe_text(program.robot),
+        "ID": f"0x{program.identity:08x}",
+        "GAIT_COUNT": str(len(program.gaits)),
+        "ROWS": str(len(befores)),
+        "PAIRS": str(len(moves)),
+        "BEFORES": "\n".join(befores),
+        "MOVES": "\n".join(moves),
+    }
+    return _filled("changes.h.in", values)
+
+
+def write_changes(program: Program, table: GaitTable, path: Path) -> Path:
+    """Write the header of a table's changes of gait; its id is that of the table's program."""
+    return write_text(path, changes_source(program, table))
+
+
+def _filled(name: str, values: Mapping[str, str]) -> str:
+    template = resources.files("srs_opt.controller").joinpath(name).read_text(encoding="utf-8")
+    return re.sub(r"@(\w+)@", lambda found: values[found[1]], template)
 
 
 def safe_text(text: str) -> str:

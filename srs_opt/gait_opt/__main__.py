@@ -16,6 +16,7 @@ from srs_opt.command import (
     make_parser,
     positive_float,
     positive_int,
+    progress,
     run_command,
     say,
 )
@@ -301,7 +302,9 @@ def _run_table(options: argparse.Namespace) -> Answer:
     import time
     from functools import partial
 
-    from srs_opt.controller.c_source import write_program
+    from planners.motion.changes import with_changes
+    from planners.motion.valves import ValveLimits
+    from srs_opt.controller.c_source import write_changes, write_program
     from srs_opt.controller.program import Program
     from srs_opt.figures import save_figure
     from srs_opt.gait_opt.catalogue import cached_table_path, default_table
@@ -342,16 +345,19 @@ def _run_table(options: argparse.Namespace) -> Answer:
         kept = len(list(unfinished.glob("*.json")))
         say(options, f"\n{kept} optimizations are kept in {unfinished}; the same command goes on from there")
         raise
+    valves = ValveLimits(options.min_dwell, options.tick)
+    table = with_changes(robot, table, valves, lambda rows: progress(rows, options, "changes of gait"))
     seconds = time.perf_counter() - begun
+    program = Program.of_table(table, options.tick)
     files = [
         save_table(table, options.out / "gait_table.json"),
         write_csv(table, options.out / "gait_table.csv"),
-        write_program(Program.of_table(table, options.tick), options.out / "gait_table.h"),
+        write_program(program, options.out / "gait_table.h"),
+        write_changes(program, table, options.out / "gait_changes.h"),
         *save_figure(table.figure(), options.out / "pareto"),
     ]
-    if (
-        options.stiffness and len(robots) > 1
-    ):  # which robot the table's motion is that of, and how far it may be off
+    if options.stiffness and len(robots) > 1:
+        # which robot the table's motion is that of, and how far it may be off
         files.append(save_robot(robot, options.out / "nominal_robot.yaml"))
     usual = limits == Limits(pressure_kpa=TABLE_PRESSURE_KPA)
     if usual and not options.warm and len(robots) == 1:  # then `plan` may take it without being told

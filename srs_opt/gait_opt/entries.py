@@ -63,7 +63,7 @@ def certified_table(
     gaits = tuple(kept for kept, _ in results if kept is not None)
     if not gaits:
         raise NoAnswerError(f"no gait of the table passes its certificate: {results[0][1]}")
-    return replace(table, gaits=gaits)
+    return table.with_gaits(gaits)
 
 
 @dataclass(frozen=True)

@@ -106,7 +106,7 @@ def with_driver_gaits(
         return images(robot, table.model, name, gait, limits.tick_s)
 
     slow = driver_gaits(robot, table.model, limits, imaged, say, jobs=jobs)
-    return replace(table, gaits=table.for_planning().gaits + slow)
+    return table.with_gaits(table.for_planning().gaits + slow)
 
 
 def _fulfilled(work: Work, tasks: Sequence[Task]) -> list[dict[str, Any]]:

@@ -14,6 +14,7 @@ from srs_opt.document import Document, load_schema, read_yaml, validate
 from srs_opt.errors import InputError
 from srs_opt.files import write_text
 from srs_opt.gait import Gait
+from srs_opt.gait_opt.changes import Changes, Moved
 from srs_opt.orbit.steady import Orbit
 from srs_opt.result import Result
 from srs_opt.robot import Robot
@@ -152,12 +153,14 @@ class GaitTable(Result):
     """Gaits of one robot under one model; `fingerprint` is the robot's.
 
     Those that planners do not use come last, so that an index means the same gait with and without them.
+    `changes` says what a cycle does after a cycle of another gait, where that was simulated.
     """
 
     robot_name: str
     fingerprint: str
     model: str
     gaits: tuple[TableGait, ...]
+    changes: Changes | None = None
 
     def __getitem__(self, name: str) -> TableGait:
         for gait in self.gaits:
@@ -168,7 +171,51 @@ class GaitTable(Result):
     def for_planning(self) -> GaitTable:
         """Return the table without what only a driver wants."""
         gaits = tuple(gait for gait in self.gaits if gait.planned)
-        return self if gaits == self.gaits else replace(self, gaits=gaits)
+        if gaits == self.gaits:
+            return self
+        changes = None if self.changes is None else self.changes.of_first(len(gaits))
+        return replace(self, gaits=gaits, changes=changes)
+
+    def with_gaits(self, gaits: tuple[TableGait, ...]) -> GaitTable:
+        """Return a table of other gaits; how they follow each other is not known."""
+        return replace(self, gaits=gaits, changes=None)
+
+    def after(self, before: str | None, now: str, speed_m_s: float = 0.0) -> Moved | None:
+        """Return what a cycle of gait `now` does after one of `before` (None: from rest).
+
+        `speed_m_s` is the forward speed at its begin: what the cycle before ended with. None where the gait
+        cannot follow, or the table does not say. `srs_after` of the firmware answers the same.
+
+        Raises
+        ------
+        KeyError
+            For a name that is not in the table.
+        """
+        if self.changes is None:
+            return None
+        numbers = {gait.name: number for number, gait in enumerate(self.gaits)}
+        return self.changes.after(
+            self.changes.rest if before is None else numbers[before], numbers[now], speed_m_s
+        )
+
+    def nearest_after(
+        self, before: str | None, begun_m_s: float, speed_m_s: float, turn_rate_rad_s: float
+    ) -> TableGait | None:
+        """Return the gait whose next cycle, after `before`, and steady motion come nearest to a wanted one.
+
+        The steady motion is as near as `nearest` asks, and weighs twice; without `changes`, `nearest` itself.
+        `begun_m_s` is the forward speed now. `srs_nearest_after` of the firmware answers the same.
+        """
+        if self.changes is None:
+            return self.nearest(speed_m_s, turn_rate_rad_s)
+        start = self.changes.rest if before is None else self.gaits.index(self[before])
+        near = [
+            (number, self.gaits[number].gait.period_s, float(off))
+            for number, off in enumerate(self._off(speed_m_s, turn_rate_rad_s, LEVER_M))
+            if off <= NEAR_M_S and (speed_m_s != 0 or turn_rate_rad_s != 0)
+        ]
+        best = self.changes.nearest(near, start, begun_m_s, (speed_m_s, turn_rate_rad_s))
+        return None if best is None else self.gaits[best]
 
     def nearest(
         self,
@@ -184,10 +231,15 @@ class GaitTable(Result):
         """
         if speed_m_s == 0 and turn_rate_rad_s == 0:
             return None
-        motion = np.array([[g.speed_m_s, lever_m * g.turn_rate_rad_s] for g in self.gaits])
-        distance = np.hypot(*(motion - [speed_m_s, lever_m * turn_rate_rad_s]).T)
+        distance = self._off(speed_m_s, turn_rate_rad_s, lever_m)
         best = int(distance.argmin())
         return self.gaits[best] if distance[best] <= tolerance_m_s else None
+
+    def _off(self, speed_m_s: float, turn_rate_rad_s: float, lever_m: float) -> np.ndarray:
+        """Return how far every gait's steady motion, in the controller's mm/s and mrad/s, is from another."""
+        motion = np.round([[g.speed_m_s, g.turn_rate_rad_s] for g in self.gaits], 3)
+        off = (motion - [speed_m_s, turn_rate_rad_s]) * [1.0, lever_m]
+        return np.asarray(np.hypot(*off.T).round(9))
 
     def to_dict(self) -> dict[str, Any]:
         """Return the table as gait_table.json holds it."""
@@ -197,6 +249,7 @@ class GaitTable(Result):
             "fingerprint": self.fingerprint,
             "model": self.model,
             "gaits": [g.record() for g in self.gaits],
+            **({} if self.changes is None else {"changes": self.changes.record()}),
         }
 
     def in_words(self) -> str:
@@ -235,6 +288,12 @@ def load_table(path: Path | str, robot: Robot | None = None) -> GaitTable:
     if used != sorted(used, reverse=True) or not used[0]:
         raise document.error(("gaits",), "gaits with 'planned: false' must come after all others")
     table = GaitTable(record["robot"], record["fingerprint"], record["model"], _entries(document))
+    if "changes" in record:
+        try:
+            changes = Changes.of_record(record["changes"], len(table.gaits))
+        except ValueError as error:
+            raise document.error(("changes",), str(error)) from error
+        table = replace(table, changes=changes)
     if robot is not None and table.fingerprint != robot.fingerprint():
         raise InputError(
             f"{path}: table was built for robot '{table.robot_name}' ({table.fingerprint}), not for "

@@ -266,7 +266,8 @@ def test_the_library_compiles_without_a_warning(tmp_path, compiler, words):
     entries = [(name, _widened(gait, 16 * (words - 1)), v, w) for name, gait, v, w in two_gaits()]
     write_program(Program.of_cycles("test", [0, 1], entries, 1e-3), tmp_path / "program.h")
     main.write_text('#include "program.h"\nconst srs_program *used(void) { return &srs_program_data; }\n')
-    for source in (FIRMWARE / "srs_player.c", FIRMWARE / "srs_link.c", main):
+    sources = [FIRMWARE / f"srs_{name}.c" for name in ("player", "link", "changes")]
+    for source in (*sources, main):
         flags = ["-std=c99", "-Os", f"-DSRS_WORDS={words}", f"-I{FIRMWARE}", "-c", str(source)]
         done = subprocess.run(
             [*compiler.split(), *flags, "-o", str(tmp_path / "out.o")], capture_output=True, text=True
@@ -295,5 +296,12 @@ def test_the_player_is_small_and_takes_nothing_from_the_system():
     for path in FIRMWARE.glob("srs_*.[ch]"):
         text = path.read_text()
         includes = set(re.findall(r"#include [<\"](.*?)[>\"]", text))
-        assert includes <= {"stdint.h", "string.h", "avr/pgmspace.h", "srs_player.h", "srs_link.h"}
+        assert includes <= {
+            "stdint.h",
+            "string.h",
+            "avr/pgmspace.h",
+            "srs_player.h",
+            "srs_link.h",
+            "srs_changes.h",
+        }
         assert not re.search(r"\b(malloc|free|printf|goto|float|double)\b", text)
