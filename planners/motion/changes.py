@@ -11,9 +11,9 @@ from planners.motion.transitions import SPEED_MARGIN, Progress, every_cycle
 from planners.motion.valves import ValveLimits
 from srs_opt.gait_opt.changes import LEVELS, Changes
 from srs_opt.gait_opt.table import GaitTable, TableGait
+from srs_opt.model.state import FORWARD, POSE
 from srs_opt.orbit.body import integrator
 from srs_opt.robot import Robot
-from srs_opt.simulate.rosenbrock import VELOCITY
 
 # Of the fastest gait's speed in the direction of the gait before: at these its cycle begins, whose ends are
 # the levels. Wider ones interpolate worse between, narrower ones leave speeds out that occur.
@@ -42,7 +42,7 @@ def with_changes(robot: Robot, table: GaitTable, limits: ValveLimits, progress: 
     for before, (begun, cycles) in enumerate(every_cycle(run, table, limits, levels, progress)):
         speed[before] = begun
         for now, level, last, samples in cycles:
-            moved[before, now, level] = (*samples[-1, :3], last[VELOCITY][0])
+            moved[before, now, level] = (*samples[-1, POSE], last[FORWARD])
     speed[n], moved[n] = np.linspace(-1e-3, 1e-3, LEVELS), moved[n, :, :1]  # from rest: one speed only
     steady = np.array([entry.displacement for entry in table.gaits])
     course = np.append(courses(steady, STILL * robot.body_width_m), 0.0)

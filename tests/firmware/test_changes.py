@@ -15,6 +15,7 @@ from srs_opt.controller.c_source import changes_source, write_changes, write_pro
 from srs_opt.controller.program import Program
 from srs_opt.errors import InputError
 from srs_opt.gait_opt.table import load_table, save_table
+from srs_opt.model.state import POSE
 from srs_opt.orbit.body import integrator
 from srs_opt.robot import wpi_srs
 
@@ -57,9 +58,9 @@ def driven(robot, table, names):
     number = {gait.name: k for k, gait in enumerate(table.gaits)}
     state, before = run.rest(), joints.rest
     for name in names:
-        state = run.run(joints.timeline(before, number[name]), state).final
+        state = run.integrate(joints.timeline(before, number[name]), state).final
         before = number[name]
-    return state[:3]
+    return state[POSE]
 
 
 def added(moves):
