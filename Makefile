@@ -49,6 +49,7 @@ docs: venv
 
 pictures: venv
 	$(PY) docs/make_pictures.py
+	$(PY) -m docs.make_notebooks
 
 clean:
 	rm -rf $(VENV) out build dist *.egg-info
