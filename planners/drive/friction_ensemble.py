@@ -16,6 +16,7 @@ from planners.drive.contact import BodyWatch
 from planners.motion.robots import undelayed, with_friction_times
 from planners.search.problem import Problem
 from srs_opt.errors import NoAnswerError
+from srs_opt.gait_opt.robust import stiffness_interval, stiffness_key
 from srs_opt.model.state import POSE_AND_SPEED
 from srs_opt.orbit.body import integrator
 from srs_opt.robot import Robot
@@ -149,12 +150,12 @@ def _yielding(robot: Robot) -> list[Robot]:
     """Return robots that are softer or stiffer than the planned one, as far as it may be off."""
     if not robot.is_soft:
         return [robot.with_values(bending_stiffness_n_m2=value) for value in STIFFNESSES_N_M2]
-    key = "gap_stiffness_n_m2" if robot.bending_stiffness_n_m2 is None else "bending_stiffness_n_m2"
-    sd = robot.relative_sd.get(key)
-    factors = STIFFNESS_TIMES if sd is None else (1 / (1 + 2 * sd), 1 + 2 * sd)
-    others = [robot.with_values(**{key: times * getattr(robot, key)}) for times in factors]
+    if robot.relative_sd.get(stiffness_key(robot)) is not None:
+        return list(stiffness_interval(robot)[1:])
+    key = stiffness_key(robot)
+    others = [robot.with_values(**{key: times * getattr(robot, key)}) for times in STIFFNESS_TIMES]
     rigid = robot.with_values(bending_stiffness_n_m2=None, gap_stiffness_n_m2=None)
-    return others if sd is not None else [*others, rigid]
+    return [*others, rigid]
 
 
 def _miss(foreseen: Trajectory | NoAnswerError, after: Array, scales: Array) -> float:

@@ -8,6 +8,7 @@ evenly. The angle is that of the path, not of the mean heading, which swings wit
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,10 +29,13 @@ class Bending:
     calibration : DriveCalibration
     course : array (n + 1,)
         Angle from the mean heading to the direction of travel at a cycle's end, per gait and rest.
+    deviation_m : array (n + 1,), optional
+        How far the body may be off after a cycle because its stiffness is (`cycle_deviation_m`).
     """
 
     calibration: DriveCalibration
     course: Array
+    deviation_m: Array | None = None
 
     @property
     def none(self) -> bool:
@@ -72,7 +76,14 @@ class Bending:
         px, py, turned = self.local(moved, float(self.course[gait] - self.course[before]), share).T
         return np.stack([x + c * px - s * py, y + s * px + c * py, heading + turned], axis=-1)
 
-    def tube_m(self, pose: Array) -> Array:
-        """Return how far a cycle may be from its poses (samples, 3), measured when it begins, two sigma."""
+    def tube_m(self, pose: Array, gait: int, most_m: float = math.inf) -> Array:
+        """Return how far a cycle may be from its poses (samples, 3), measured when it begins, two sigma.
+
+        What the stiffness's deviation does counts up to `most_m` at the cycle's end.
+        """
         way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(pose[:, :2], axis=0).T))])
-        return np.asarray(self.calibration.margin_m(1.0) * way)
+        measured = self.calibration.margin_m(1.0) * way
+        if self.deviation_m is None:
+            return np.asarray(measured)
+        own = min(float(self.deviation_m[gait]), most_m)
+        return np.hypot(measured, own * way / max(float(way[-1]), 1e-9))

@@ -5,12 +5,14 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-from dataclasses import astuple
+from dataclasses import astuple, replace
 from importlib import resources
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
+from planners.motion.deviation import cycle_deviation_m
 from planners.motion.table import SAMPLES, MotionTable
 from planners.motion.transitions import (
     LEVELS,
@@ -22,6 +24,7 @@ from planners.motion.transitions import (
 )
 from planners.motion.valves import DEFAULT_LIMITS, SETTLE_S, STAIR_S, ValveLimits
 from srs_opt.files import atomic_path
+from srs_opt.gait_opt.robust import LEAST_SD, stiffness_deviation
 from srs_opt.gait_opt.table import GaitTable
 from srs_opt.robot import Robot
 from srs_opt.simulate.compiled import cache_folder
@@ -55,7 +58,27 @@ def load_motion(
     if transitions is None:
         transitions = rounded(simulate_transitions(robot, table, limits, progress))
         write_transitions(cached, transitions)
-    return motion_table(robot, table, transitions, limits)
+    motion = motion_table(robot, table, transitions, limits)
+    return replace(motion, deviation_m=_load_deviation(robot, table, key))
+
+
+def _load_deviation(robot: Robot, table: GaitTable, key: str) -> NDArray[np.float64] | None:
+    """Return what `cycle_deviation_m` finds, cached as the motion table is."""
+    if stiffness_deviation(robot) < LEAST_SD:
+        return None
+    cached = cache_folder() / f"deviation_{key}_{stiffness_deviation(robot):.4g}_{_equations_digest()}.npz"
+    try:
+        with np.load(io.BytesIO(cached.read_bytes())) as stored:
+            found = np.array(stored["deviation_m"])
+        if found.shape == (len(table.gaits) + 1,) and np.isfinite(found).all():
+            return found
+    except Exception:  # as in `_read`
+        pass
+    deviation_m = cycle_deviation_m(robot, table)
+    if deviation_m is not None:
+        with atomic_path(cached) as temporary:
+            np.savez_compressed(temporary, deviation_m=deviation_m)
+    return deviation_m
 
 
 def rounded(transitions: Transitions) -> Transitions:

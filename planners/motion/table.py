@@ -57,6 +57,8 @@ class MotionTable:
         How a cycle follows another; where none can, the arrays mean nothing.
     origin : tuple of int
         The gait that each cycle made for one plan has come from; it leaves the robot much as that gait does.
+    deviation_m : array (n + 1,), optional
+        How far the body may be off after a cycle of each gait because its stiffness is.
     """
 
     names: tuple[str, ...]
@@ -69,6 +71,7 @@ class MotionTable:
     body_width_m: float
     joints: Joints
     origin: tuple[int, ...] = ()
+    deviation_m: Array | None = None
 
     @property
     def rest(self) -> int:

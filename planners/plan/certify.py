@@ -181,7 +181,7 @@ class Certifier:
         unseen += _sagitta(problem, kappa)
         between = float((room - unseen).min())
         # the start may be as near as it likes: nothing can be asked of it that integration could lose
-        tube = np.concatenate([problem.bending.tube_m(pose[cycle == k]) for k in np.unique(cycle)])
+        tube = np.concatenate([problem.tube_m(pose[cycle == k], gaits[k]) for k in np.unique(cycle)])
         wanted = problem.margin_m + np.where(cycle == 0, root.slack_m - error, tube - ROUNDING_M)
         close = room < wanted
         failed = int(cycle[close.argmax()]) if close.any() else None

@@ -6,6 +6,8 @@ import argparse
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+
 from planners.maze.load import load_maze
 from planners.maze.maze import Maze
 from planners.maze.placement import check_placement
@@ -17,10 +19,11 @@ from planners.motion.transitions import Progress
 from planners.motion.valves import DEFAULT_LIMITS, ValveLimits, playable
 from planners.plan.options import MARGIN_M
 from planners.search.cost_model import Cost
-from planners.search.problem import Problem
+from planners.search.problem import MOST_DEVIATION, Problem
 from srs_opt.command import chosen_model, progress, say
 from srs_opt.drive.calibration import NO_CALIBRATION, DriveCalibration, load_calibration
 from srs_opt.errors import InputError
+from srs_opt.gait_opt.robust import stiffness_deviation
 from srs_opt.gait_opt.table import GaitTable, load_table
 from srs_opt.model.parameters import room_effects
 from srs_opt.robot import Robot, load_robot
@@ -71,6 +74,12 @@ def planning_problem(
     if len(gaits.gaits) < len(table.gaits):
         tell(f"note: {len(gaits.gaits)} of {len(table.gaits)} gaits keep the valves' limits")
     motion = load_motion(robot, gaits, valves, show)
+    if motion.deviation_m is not None:
+        tell(
+            f"note: stiffness known within {100 * stiffness_deviation(robot):.0f} %: a cycle may end "
+            f"{1e3 * float(np.median(motion.deviation_m[:-1])):.1f} mm off (median gait, two standard "
+            f"deviations); up to {1e3 * MOST_DEVIATION * robot.length_m:.0f} mm of it are kept as room"
+        )
     if drive is not None:
         motion = motion.bent(Bending(drive, motion.course))
         tell(
@@ -185,6 +194,6 @@ def gaits_for(
     if not robot.is_soft:
         tell(
             f"note: robot '{robot.name}' gives no bending stiffness: rigid actuators assumed; a body that "
-            "bends moves otherwise (measure it, or gait_opt --table --stiffness EI...)"
+            "bends moves otherwise (measure it; for unknown stiffness see gait_opt --table)"
         )
     return default_table(robot, model or robot.own_model, say=tell, driver=True)

@@ -14,11 +14,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from planners.motion.robots import undelayed
 from planners.motion.table import body_in_room
 from planners.plan.answer import Plan
+from planners.plan.certify import clearances
 from planners.search.problem import Problem
 from planners.search.tree import at_rest
 from srs_opt.errors import NoAnswerError
+from srs_opt.gait_opt.robust import stiffness_interval
+from srs_opt.orbit.body import integrator
+from srs_opt.robot import Robot
 from srs_opt.simulate.batched import run_batched
 from srs_opt.simulate.shapes import centre_lines
 
@@ -103,15 +108,42 @@ def _open_loop(problem: Problem, plan: Plan, tolerance: Tolerance) -> tuple[floa
     """Return the least clearance and the way for which it is positive.
 
     At rest there is no speed to be wrong; place and heading move the whole motion rigidly, a heading by the
-    distance from the start. A calibrated drive's uncertainty grows with the way.
+    distance from the start. A calibrated drive's uncertainty grows with the way. Where the stiffness is known
+    with a deviation, the plan is played on the bodies at both ends of its interval too.
     """
     c = plan.certificate
-    far = np.hypot(*(c.lines - c.pose[0, :2]).transpose(2, 0, 1)).max(axis=1)
-    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(c.pose[:, :2], axis=0).T))])
-    tube = tolerance.position_m + tolerance.heading_rad * far + problem.drive.margin_m(1.0) * way
-    left = c.room_m - tube
-    bad = np.flatnonzero(left <= 0)
-    return float(left.min()), float(way[bad[0]] if bad.size else way[-1])
+    ways = [(c.pose, c.lines, c.room_m)]
+    for other in stiffness_interval(problem.robot)[1:]:
+        try:
+            ways.append(_played(problem, plan, other))
+        except NoAnswerError:
+            return float("-inf"), 0.0
+    least_m, until_m = [], []
+    for pose, lines, room_m in ways:
+        far = np.hypot(*(lines - pose[0, :2]).transpose(2, 0, 1)).max(axis=1)
+        way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(pose[:, :2], axis=0).T))])
+        tube = tolerance.position_m + tolerance.heading_rad * far + problem.drive.margin_m(1.0) * way
+        left = room_m - tube
+        bad = np.flatnonzero(left <= 0)
+        least_m.append(float(left.min()))
+        until_m.append(float(way[bad[0]] if bad.size else way[-1]))
+    return min(least_m), min(until_m)
+
+
+def _played(problem: Problem, plan: Plan, robot: Robot) -> tuple[Array, Array, Array]:
+    """Return poses, bodies and their clearances while another robot plays the plan's valves."""
+    run, start = integrator(undelayed(robot), problem.gaits.model), problem.start
+    state, before, ended_s = run.rest(start.x, start.y, start.heading), problem.motion.rest, 0.0
+    pose, kappa = [], []
+    for gait in plan.gaits:
+        trajectory = problem.bent(run.integrate(problem.joints.timeline(before, gait), state), before, gait)
+        seen = np.flatnonzero(trajectory.time_s + ended_s <= plan.certificate.time_s[-1] + 1e-9)[::THINNED]
+        pose.append(trajectory.pose[seen])
+        kappa.append(trajectory.kappa[seen])
+        state, before, ended_s = trajectory.final, gait, ended_s + trajectory.time_s[-1]
+    poses = np.concatenate(pose)
+    lines = body_in_room(centre_lines(run, np.concatenate(kappa)), poses)
+    return poses, lines, clearances(problem, lines)
 
 
 def _closed_loop(problem: Problem, plan: Plan, tolerance: Tolerance) -> float:
@@ -142,7 +174,7 @@ def _closed_loop(problem: Problem, plan: Plan, tolerance: Tolerance) -> float:
         seen = np.flatnonzero(trajectory.time_s + begun_s <= c.time_s[-1] + 1e-9)[::THINNED]
         pose = trajectory.pose[seen]
         body = centre_lines(problem.integrator, trajectory.kappa[seen])
-        tube = tolerance.position_m + problem.bending.tube_m(pose)
+        tube = tolerance.position_m + problem.bending.tube_m(pose, problem.motion.row(gait))
         for turn in (-tolerance.heading_rad, 0.0, tolerance.heading_rad):
             lines = body_in_room(body, _turned(pose, turn))
             least_m = min(least_m, _least(problem, lines, tube))

@@ -35,6 +35,9 @@ ROUNDING_M = 1e-6
 # Of the shortest way, and body lengths more: longer detours are not looked at.
 DETOUR_TIMES, DETOUR_LENGTHS = 1.5, 16.0
 FIELD = 0.0212  # body lengths between the nodes of the distance field, where the maze is small enough
+# Body lengths (10 mm): plans keep this much room at most for a stiffness's deviation. What a cycle may be off
+# would close most mazes where a stiffness is known within a factor; the driver sees and learns every cycle.
+MOST_DEVIATION = 0.0424
 STEP_S = 0.002  # errs by about 0.04 mrad per cycle
 
 
@@ -165,7 +168,12 @@ class Problem:
     @cached_property
     def bending(self) -> Bending:
         """What measured factors do to a cycle of the model."""
-        return Bending(self.drive, self.motion.course)
+        return Bending(self.drive, self.motion.course, self.motion.deviation_m)
+
+    def tube_m(self, pose: Array, number: int) -> Array:
+        """Return the room beyond the margin that a cycle keeps for where it may end otherwise."""
+        most_m = MOST_DEVIATION * self.robot.length_m
+        return self.bending.tube_m(pose, self.motion.row(number), most_m)
 
     @property
     def joints(self) -> Joints:
@@ -230,7 +238,7 @@ class Problem:
         pose = np.stack([self.bending.placed(p, b, g, share) for (b, g, _), p in zip(went, samples[..., :3])])
         placed = body_in_room(lines.reshape(*curved.shape[:-1], *lines.shape[1:]), pose)
         cycles = []
-        for (*_, (last, _)), poses, body in zip(went, pose, placed):
+        for (_, gait, (last, _)), poses, body in zip(went, pose, placed):
             state = last if self.bending.none else np.concatenate([poses[-1], last[3:]])
-            cycles.append(Cycle(state, poses, body, float(self.bending.tube_m(poses)[-1])))
+            cycles.append(Cycle(state, poses, body, float(self.tube_m(poses, gait)[-1])))
         return cycles

@@ -281,10 +281,15 @@ def run(options: argparse.Namespace) -> Answer:
 
 def _robots_of_table(options: argparse.Namespace) -> tuple[Robot, ...]:
     """Return the robots that a table has to serve, the one whose motion it states first."""
+    from srs_opt.gait_opt.any_table import of_any_stiffness, unknown_stiffness, unknown_words
     from srs_opt.gait_opt.robust import in_the_middle
     from srs_opt.robot import load_robot
 
     robots = softened(options, [load_robot(path) for path in options.robots or [options.robot]])
+    asked = options.model or options.stiffness or options.robots or options.warm
+    if not asked and unknown_stiffness(robots[0]):
+        say(options, f"note: {unknown_words(robots[0])}")
+        return of_any_stiffness(robots[0])
     return in_the_middle(robots) if options.stiffness else tuple(robots)
 
 
@@ -307,13 +312,11 @@ def _run_table(options: argparse.Namespace) -> Answer:
     from srs_opt.controller.c_source import write_changes, write_program
     from srs_opt.controller.program import Program
     from srs_opt.figures import save_figure
-    from srs_opt.gait_opt.catalogue import cached_table_path, default_table
+    from srs_opt.gait_opt.any_table import make_table, usual
+    from srs_opt.gait_opt.catalogue import cached_table_path
     from srs_opt.gait_opt.entries import certified_table
     from srs_opt.gait_opt.export import write_csv
-    from srs_opt.gait_opt.family import TABLE_PRESSURE_KPA, build_table
-    from srs_opt.gait_opt.goal import Limits
     from srs_opt.gait_opt.report import if_soft, robust_words, soft_speeds
-    from srs_opt.gait_opt.robust_table import robust_table
     from srs_opt.gait_opt.table import load_table, save_table
     from srs_opt.judge.bodies import check_judge
     from srs_opt.judge.opinion import Case, opinions
@@ -332,15 +335,9 @@ def _run_table(options: argparse.Namespace) -> Answer:
         if options.warm:
             table = load_table(options.warm, robot)
             table = certified_table(robot, table, limits, partial(say, options), on_other_ticks=True, **where)
-        elif len(robots) > 1:
-            rigid = robot.with_values(bending_stiffness_n_m2=None, gap_stiffness_n_m2=None)
-            basis = default_table(rigid, say=partial(say, options))
-            worst = options.worst or "relative"
-            table = robust_table(robots, model, basis, limits, worst, partial(say, options), **where)
         else:
-            table = build_table(
-                robot, model, limits, partial(say, options), resume=unfinished, driver=True, **where
-            )
+            worst = options.worst or "relative"
+            table = make_table(robots, model, limits, unfinished, worst, partial(say, options), **where)
     except KeyboardInterrupt:
         kept = len(list(unfinished.glob("*.json")))
         say(options, f"\n{kept} optimizations are kept in {unfinished}; the same command goes on from there")
@@ -356,11 +353,11 @@ def _run_table(options: argparse.Namespace) -> Answer:
         write_changes(program, table, options.out / "gait_changes.h"),
         *save_figure(table.figure(), options.out / "pareto"),
     ]
-    if options.stiffness and len(robots) > 1:
-        # which robot the table's motion is that of, and how far it may be off
+    chosen, hint = len(robots) > 1 and not options.warm, ""
+    if chosen and not options.robots:  # whose motion the table's is, and how far it may be off
         files.append(save_robot(robot, options.out / "nominal_robot.yaml"))
-    usual = limits == Limits(pressure_kpa=TABLE_PRESSURE_KPA)
-    if usual and not options.warm and len(robots) == 1:  # then `plan` may take it without being told
+        hint = f"\n  to plan with it: plan MAZE --robot {files[-1]} --gaits {files[0]}"
+    if usual(limits) and not options.warm and not options.robots:  # then `plan` takes it without being told
         files.append(save_table(table, cached_table_path(robot, model)))
     shutil.rmtree(unfinished, ignore_errors=True)
     fastest = max(table.gaits, key=lambda g: g.speed_m_s)
@@ -375,9 +372,9 @@ def _run_table(options: argparse.Namespace) -> Answer:
         "solve_s": seconds,
     }
     words = f"{len(table.gaits)} gaits up to {fastest.speed_m_s:.3f} m/s in {seconds:.0f} s"
-    if len(robots) > 1:
+    if chosen:
         answer["worst_speed_m_s"] = table.gaits[0].worst_speed_m_s
-        words += robust_words(table, robots)
+        words += robust_words(table, robots) + hint
     good = True
     if options.judge:
         say(options, "asking the other engine")

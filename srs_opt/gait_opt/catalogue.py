@@ -7,7 +7,8 @@ from importlib import resources
 from pathlib import Path
 
 from srs_opt.errors import InputError
-from srs_opt.gait_opt.replayed import replayed
+from srs_opt.gait_opt.goal import Limits
+from srs_opt.gait_opt.robust import stiffness_deviation, stiffness_interval
 from srs_opt.gait_opt.table import GaitTable, load_table, save_table
 from srs_opt.robot import Robot, wpi_srs
 
@@ -21,10 +22,27 @@ def shipped_table() -> GaitTable:
 
 
 def cached_table_path(robot: Robot, model: str = "complex") -> Path:
-    """Return where the table of `robot` is kept once it is built."""
+    """Return where the table of `robot` is kept once it is built.
+
+    Tables of soft robots depend on how far the stiffness may be off, which the fingerprint leaves out.
+    """
     from srs_opt.simulate.compiled import cache_folder
 
-    return cache_folder() / f"table_{model}_{robot.fingerprint()}.json"
+    deviation = f"_sd{stiffness_deviation(robot):.4g}" if model == "compliant" else ""
+    return cache_folder() / f"table_{model}_{robot.fingerprint()}{deviation}.json"
+
+
+def known_table(robot: Robot, model: str = "complex") -> GaitTable | None:
+    """Return the table of `robot` that comes with the package or was built before, if there is one."""
+    if model == "complex" and robot.fingerprint() == wpi_srs().fingerprint():
+        return shipped_table()
+    path = cached_table_path(robot, model)
+    if path.exists():
+        try:
+            return load_table(path, robot)
+        except InputError:  # an old version or a damaged file: build it again
+            path.unlink(missing_ok=True)
+    return None
 
 
 def default_table(
@@ -35,6 +53,9 @@ def default_table(
     driver: bool = False,
 ) -> GaitTable:
     """Return the gait table of `robot`: shipped with the package, built before, or built now.
+
+    That of a soft robot has the gaits of the rigid one and the robust gait with its companions, as it moves
+    by them; with a deviation of its stiffness, those that serve its whole interval (`stiffness_interval`).
 
     Parameters
     ----------
@@ -49,20 +70,22 @@ def default_table(
 
 
 def _whole_table(robot: Robot, model: str, say: Callable[[str], None] | None) -> GaitTable:
-    if model == "complex" and robot.fingerprint() == wpi_srs().fingerprint():
-        return shipped_table()
-    path = cached_table_path(robot, model)
-    if path.exists():
-        try:
-            return load_table(path, robot)
-        except InputError:  # an old version or a damaged file: build it again
-            path.unlink(missing_ok=True)
+    table = known_table(robot, model)
+    if table is not None:
+        return table
+    tell = say or (lambda text: None)
     if model == "compliant":
+        from srs_opt.gait_opt.family import TABLE_PRESSURE_KPA
+        from srs_opt.gait_opt.robust_table import chosen_table
+
         rigid = robot.with_values(bending_stiffness_n_m2=None, gap_stiffness_n_m2=None)
-        table = replayed(robot, _whole_table(rigid, "complex", say), model)
+        basis = _whole_table(rigid, "complex", say)
+        tell("choosing gaits for this stiffness (once per robot)")
+        limits = Limits(pressure_kpa=TABLE_PRESSURE_KPA)
+        table = chosen_table(stiffness_interval(robot), model, basis, limits, say=tell)
     else:
         from srs_opt.gait_opt.family import build_table
 
-        table = build_table(robot, model, say=say or (lambda text: None))
-    save_table(table, path)
+        table = build_table(robot, model, say=tell)
+    save_table(table, cached_table_path(robot, model))
     return table

@@ -22,17 +22,31 @@ def of_stiffness(robot: Robot, ei_n_m2: float) -> Robot:
     return robot.with_values(bending_stiffness_n_m2=ei_n_m2, name=f"{robot.name}, EI {ei_n_m2:g} N m^2")
 
 
+def stiffness_key(robot: Robot) -> str:
+    """Return the name of the stiffness that makes a soft robot soft: the segments', else the gaps'."""
+    return "gap_stiffness_n_m2" if robot.bending_stiffness_n_m2 is None else "bending_stiffness_n_m2"
+
+
+def stiffness_deviation(robot: Robot) -> float:
+    """Return the relative standard deviation of a soft robot's stiffness; 0 if rigid or not given."""
+    return robot.relative_sd.get(stiffness_key(robot), 0.0) if robot.is_soft else 0.0
+
+
 def stiffness_interval(robot: Robot) -> tuple[Robot, ...]:
     """Return the robot with its own stiffness and with those at the ends of what it may be.
 
     These are two standard deviations of its logarithm away (`Robot.relative_sd`); the robot alone where the
     file has no deviation, or one below `LEAST_SD`.
     """
-    ei, sd = robot.bending_stiffness_n_m2, robot.relative_sd.get("bending_stiffness_n_m2", 0.0)
-    if ei is None or sd < LEAST_SD:
+    key, sd = stiffness_key(robot), stiffness_deviation(robot)
+    if sd < LEAST_SD:
         return (robot,)
-    reach = math.exp(INTERVAL_SD * sd)
-    return robot, of_stiffness(robot, ei / reach), of_stiffness(robot, ei * reach)
+    reach, ei = math.exp(INTERVAL_SD * sd), getattr(robot, key)
+    what = "gap EI" if key == "gap_stiffness_n_m2" else "EI"
+    return robot, *(
+        robot.with_values(**{key: value, "name": f"{robot.name}, {what} {value:g} N m^2"})
+        for value in (ei / reach, ei * reach)
+    )
 
 
 SPREAD = {

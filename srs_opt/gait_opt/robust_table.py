@@ -71,29 +71,46 @@ def robust_table(
     NoAnswerError
         If no gait serves all, or the published gait does not move one of them.
     """
+    table = chosen_table(robots, model, rigid, limits, worst, say, jobs=jobs)
+    return certified_table(robots[0], table, limits, say, jobs=jobs, cluster=cluster)
+
+
+def chosen_table(
+    robots: tuple[Robot, ...],
+    model: str,
+    rigid: GaitTable,
+    limits: Limits,
+    worst: str = "relative",
+    say: Say = lambda text: None,
+    *,
+    jobs: int = 1,
+) -> GaitTable:
+    """Return `robust_table` without certificates. Raises as it does."""
     if len({robot.links for robot in robots}) > 1:
         raise InputError("a gait table for several robots needs the same number of links in all of them")
-    named = [(entry.name, entry.gait) for entry in rigid.gaits]
-    named += robust_companions(robots[0], limits)
-    named = [(name, gait) for name, gait in named if _allowed(gait, limits)]
-    found = [steady_gaits(robot, [gait for _, gait in named], model, jobs=jobs) for robot in robots]
+    named = [(entry.name, entry.gait, entry.planned) for entry in rigid.gaits]
+    named += [(name, gait, True) for name, gait in robust_companions(robots[0], limits)]
+    named = [asked for asked in named if _allowed(asked[1], limits)]
+    found = [steady_gaits(robot, [gait for _, gait, _ in named], model, jobs=jobs) for robot in robots]
     scale = np.ones(len(robots))
-    if worst == "relative":
+    if worst == "relative" and len(robots) > 1:
         fastest = (limits.frequency_hz[1], limits.pressure_kpa[1])
         published = (steady_gait(r, published_wave(r, *fastest).gait(), model) for r in robots)
         scale = np.array([orbit.speed_m_s for orbit in published])
     kept: list[tuple[float, TableGait]] = []
-    for (name, _), orbits in zip(named, zip(*found)):
+    for (name, _, planned), orbits in zip(named, zip(*found)):
         if good := _alike(orbits):
             speeds = np.array([abs(orbit.speed_m_s) for orbit in good])
-            entry = replace(TableGait.of_orbit(name, good[0]), worst_speed_m_s=float(speeds.min()))
+            slowest = float(speeds.min()) if len(robots) > 1 else None
+            entry = replace(TableGait.of_orbit(name, good[0]), worst_speed_m_s=slowest, planned=planned)
             kept.append((float((speeds / scale).min()), entry))
-    if not kept:
+    if not any(entry.planned for _, entry in kept):
         raise NoAnswerError("no gait of the table serves all of the robots")
-    kept.sort(key=lambda pair: -round(pair[0], 3))  # images of one gait stay together, forward first
-    say(f"{len(kept)} of {len(named)} gaits serve all {len(robots)} robots")
-    table = GaitTable(robots[0].name, robots[0].fingerprint(), model, tuple(entry for _, entry in kept))
-    return certified_table(robots[0], table, limits, say, jobs=jobs, cluster=cluster)
+    # images of one gait stay together, forward first; what planners do not use comes last
+    kept.sort(key=lambda pair: (not pair[1].planned, -round(pair[0], 3)))
+    if len(robots) > 1:
+        say(f"{len(kept)} of {len(named)} gaits serve all {len(robots)} robots")
+    return GaitTable(robots[0].name, robots[0].fingerprint(), model, tuple(entry for _, entry in kept))
 
 
 def _allowed(gait: Gait, limits: Limits) -> bool:

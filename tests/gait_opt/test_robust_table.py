@@ -3,14 +3,13 @@
 import numpy as np
 import pytest
 
-from srs_opt.gait_opt import companions
-from srs_opt.gait_opt.catalogue import shipped_table
-from srs_opt.gait_opt.goal import Limits
+from srs_opt.gait_opt import any_table, catalogue, companions
+from srs_opt.gait_opt.__main__ import main
+from srs_opt.gait_opt.catalogue import cached_table_path, default_table, shipped_table
 from srs_opt.gait_opt.robust import in_the_middle, of_stiffness, spread
-from srs_opt.gait_opt.robust_table import robust_table
-from srs_opt.gait_opt.table import GaitTable, load_table, save_table
+from srs_opt.gait_opt.table import GaitTable, load_table
 from srs_opt.orbit.steady import steady_gait
-from srs_opt.robot import wpi_srs
+from srs_opt.robot import load_robot, wpi_srs
 
 STIFFNESSES = (0.002, 0.02, 0.005)
 
@@ -32,17 +31,46 @@ def test_actuators_that_are_off_stand_beside_the_softest_and_the_stiffest_body()
     assert len(spread([wpi_srs()], 0.1)) == 5
 
 
-def test_a_table_for_unknown_stiffness_leads_with_the_robust_gait(monkeypatch, tmp_path):
+@pytest.fixture
+def few(monkeypatch, tmp_path):
+    """Two gaits in place of the shipped table, one of them for drivers; what is kept, is kept in a folder."""
     monkeypatch.setattr(companions, "OFFSETS", (0.0,))
-    robots = in_the_middle([of_stiffness(wpi_srs(), ei) for ei in STIFFNESSES])
     shipped = shipped_table()
-    few = GaitTable(shipped.robot_name, shipped.fingerprint, shipped.model, (shipped["fast"],))
-    table = robust_table(robots, "compliant", few, Limits(pressure_kpa=(20.0, 55.0)))
-    names = [g.name for g in table.gaits]
-    assert names[0].startswith("robust") and names[-1] == "fast"
-    assert table.fingerprint == robots[0].fingerprint()
+    gaits = (shipped["fast"], next(g for g in shipped.gaits if not g.planned))
+    table = GaitTable(shipped.robot_name, shipped.fingerprint, shipped.model, gaits)
+    monkeypatch.setattr(catalogue, "shipped_table", lambda: table)
+    for module in (catalogue, any_table):
+        monkeypatch.setattr(
+            module, "cached_table_path", lambda *asked: tmp_path / "kept" / cached_table_path(*asked).name
+        )
+    return table
+
+
+def test_the_table_of_a_robot_of_unknown_stiffness_is_the_robust_one(few, tmp_path, capsys):
+    """Nobody has to know of --stiffness: what `--table` writes serves whatever the segments are."""
+    out = tmp_path / "out"
+    assert main(["--table", "--jobs", "1", "--out", str(out)]) == 0
+    told = capsys.readouterr()
+    assert "gives no bending stiffness" in told.err and "--model complex" in told.err
+    nominal = load_robot(out / "nominal_robot.yaml")
+    table = load_table(out / "gait_table.json", nominal)
+    assert nominal.bending_stiffness_n_m2 == 0.005
     first = table.gaits[0]
-    speeds = [abs(steady_gait(r, first.gait).speed_m_s) for r in robots]
-    assert first.worst_speed_m_s == pytest.approx(min(speeds)) and min(speeds) > 0.45
+    speeds = [abs(steady_gait(of_stiffness(wpi_srs(), ei), first.gait).speed_m_s) for ei in STIFFNESSES]
+    assert first.name == "robust" and first.certificate is not None
+    assert first.worst_speed_m_s == pytest.approx(min(speeds)) and min(speeds) > 0.47
     assert table["fast"].worst_speed_m_s < 0.2
-    assert load_table(save_table(table, tmp_path / "t.json"), robots[0]) == table
+    kept = default_table(nominal, "compliant")  # `plan` takes it without being told
+    assert kept.gaits == table.for_planning().gaits and kept.changes is not None
+
+
+def test_the_default_table_of_a_soft_robot_has_the_robust_gait(few):
+    soft = wpi_srs().with_values(bending_stiffness_n_m2=0.002)
+    table = default_table(soft, "compliant", driver=True)
+    assert table.gaits[0].name == "robust" and table.gaits[0].worst_speed_m_s is None
+    assert table.gaits[0].speed_m_s > 3 * table["fast"].speed_m_s
+    assert [g.planned for g in table.gaits] == sorted((g.planned for g in table.gaits), reverse=True)
+    unsure = soft.with_values(relative_sd={"bending_stiffness_n_m2": 0.2})
+    assert soft.fingerprint() == unsure.fingerprint()
+    worst = default_table(unsure, "compliant").gaits[0].worst_speed_m_s
+    assert worst < table.gaits[0].speed_m_s  # at two deviations below it runs slower

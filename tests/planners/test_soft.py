@@ -1,19 +1,29 @@
 """Planning and driving for bodies that bend; soft robots under rigid plans."""
 
+import dataclasses
+from pathlib import Path
+
 import numpy as np
 import pytest
 from planner_rooms import corridor
 
 from planners.drive.execute import execute
+from planners.drive.friction_ensemble import _yielding
+from planners.motion.deviation import cycle_deviation_m
 from planners.motion.transitions import motion_table, simulate_transitions
+from planners.plan.inputs import placed_maze, planning_problem
+from planners.plan.looks import looks
 from planners.plan.solve import solve_with_lattice
 from planners.search.problem import Problem
+from srs_opt.gait_opt.catalogue import shipped_table
 from srs_opt.gait_opt.replayed import replayed
 from srs_opt.robot import wpi_srs
 from srs_opt.simulate.integrate import Integrator
 from srs_opt.simulate.timeline import Timeline
 from virtual_lab.live import LiveRobot
 from virtual_lab.truth import Parameters, Truth
+
+FIRST = Path(__file__).parents[2] / "mazes" / "first.yaml"
 
 
 def soft(stiffness):
@@ -84,6 +94,14 @@ def test_soft_robots_under_a_rigid_plan_seldom_touch(problem_in):
     assert sum(driven.reached for driven in drives) >= 7
 
 
+def test_a_soft_robot_under_the_rigid_plan_of_the_first_maze_arrives():
+    """benchmarks/soft_drives.py has the other stiffnesses, and the plans made for the soft robot itself."""
+    robot = wpi_srs()
+    problem = planning_problem(robot, placed_maze(robot, FIRST, 0.005), shipped_table())
+    driven = execute(problem, solve_with_lattice(problem).plan, soft(0.005))
+    assert driven.reached and driven.collisions == 0
+
+
 @pytest.mark.parametrize("stiffness", [None, 0.02, 0.002])
 def test_other_robots_under_a_soft_plan_never_touch(soft_problem, stiffness):
     other = wpi_srs() if stiffness is None else soft(stiffness)
@@ -92,14 +110,64 @@ def test_other_robots_under_a_soft_plan_never_touch(soft_problem, stiffness):
     assert driven.reached or driven.reason.startswith("stopped")
 
 
+SD = 0.15
+ENDS = (0.005 * np.exp(-2 * SD), 0.005 * np.exp(2 * SD))
+
+
+@pytest.fixture(scope="module")
+def unsure_problem(soft_problem):
+    """The same robot, its stiffness known within a few per cent."""
+    robot = soft(0.005).with_values(relative_sd={"bending_stiffness_n_m2": SD})
+    deviation = cycle_deviation_m(robot, soft_problem.gaits)
+    motion = dataclasses.replace(soft_problem.motion, deviation_m=deviation)
+    return dataclasses.replace(soft_problem, robot=robot, motion=motion)
+
+
+def test_a_cycle_may_be_off_by_what_the_stiffness_may_be_off(soft_problem, unsure_problem):
+    """Simulated from rest on the softest and the stiffest body that it may be."""
+    assert cycle_deviation_m(soft(0.005), soft_problem.gaits) is None
+    index = [g.name for g in unsure_problem.gaits.gaits].index("fast")
+    gait = unsure_problem.gaits.gaits[index].gait
+    line = Timeline.of_gait(gait, 12 * gait.period_s)
+    ways = []
+    for stiffness in (0.005, *ENDS):
+        run = Integrator(soft(stiffness))
+        path = run.integrate(line, run.rest())
+        last, _ = path.at(np.array([11 * gait.period_s, 12 * gait.period_s]))
+        ways.append(np.hypot(*(last[1] - last[0])[:2]))
+    off = max(abs(way - ways[0]) for way in ways)
+    assert unsure_problem.motion.deviation_m[index] == pytest.approx(off, rel=0.05)
+
+
+def test_the_stiffness_deviation_is_room_that_plans_and_looks_keep(soft_problem, unsure_problem):
+    sure, unsure = (solve_with_lattice(p).plan for p in (soft_problem, unsure_problem))
+    tube = unsure_problem.motion.deviation_m[list(unsure.gaits)]
+    assert unsure.certificate.passed and unsure.certificate.clearance_m > 0.005
+    assert tube.min() > 0.001
+    at_the_end = unsure_problem.bending.tube_m(unsure.certificate.pose[-20:], unsure.gaits[-1])
+    assert at_the_end[-1] == pytest.approx(tube[-1])
+    known, open_loop = looks(soft_problem, sure), looks(unsure_problem, sure)
+    assert open_loop.open_loop_m < known.open_loop_m
+    assert open_loop.closed_loop_m < known.closed_loop_m
+
+
+def test_the_driver_suspects_the_ends_of_the_stiffness_interval(unsure_problem):
+    suspects = _yielding(unsure_problem.robot)
+    assert [s.bending_stiffness_n_m2 for s in suspects] == pytest.approx(ENDS)
+    plan = solve_with_lattice(unsure_problem).plan
+    for stiffness in ENDS:
+        driven = execute(unsure_problem, plan, soft(stiffness))
+        assert driven.collisions == 0 and driven.reached
+
+
 def test_states_are_carried_between_models(soft_problem, problem_in):
     run, rigid = soft_problem.integrator, problem_in(corridor(0.3, 2.0))
     gait = soft_problem.gaits.gaits[0].gait
     state = run.integrate(Timeline.of_gait(gait, 3.2 * gait.period_s), run.rest()).final
     adopted = rigid.as_planned(state, run)
-    assert adopted.shape == (rigid.run.states,)
-    np.testing.assert_array_equal(adopted[rigid.run.layout.kappa], state[run.layout.actuator][:4])
-    back = soft_problem.as_planned(adopted, rigid.run)
-    np.testing.assert_array_equal(back[run.layout.kappa], adopted[rigid.run.layout.kappa])
+    assert adopted.shape == (rigid.integrator.states,)
+    np.testing.assert_array_equal(adopted[rigid.integrator.layout.kappa], state[run.layout.actuator][:4])
+    back = soft_problem.as_planned(adopted, rigid.integrator)
+    np.testing.assert_array_equal(back[run.layout.kappa], adopted[rigid.integrator.layout.kappa])
     np.testing.assert_array_equal(back[run.layout.actuator][:8], state[run.layout.actuator][:8])
     np.testing.assert_array_equal(soft_problem.as_planned(state)[7:], state[7:])

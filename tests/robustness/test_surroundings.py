@@ -257,7 +257,7 @@ def test_ctrl_c_in_long_work(name, tmp_path):
     """Work in several processes ends as one; gait_opt may answer with the best gait so far."""
     arguments = ["srs_opt.gait_opt", "--starts", "200"]
     if name == "table":
-        arguments = ["srs_opt.gait_opt", "--table", "--jobs", "2"]
+        arguments = ["srs_opt.gait_opt", "--table", "--model", "complex", "--jobs", "2"]
     if name == "discrepancy":
         run(["virtual_lab", "--effect", "stribeck", "--quiet", "--out", str(tmp_path / "set")])
         arguments = ["srs_opt.discrepancy", str(tmp_path / "set"), "--jobs", "2"]
