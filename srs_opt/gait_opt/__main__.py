@@ -297,8 +297,6 @@ def _run_table(options: argparse.Namespace) -> Answer:
     """Build the gait table and write it as JSON, CSV and C header."""
     from srs_opt.errors import InputError
 
-    if options.worst and not (options.stiffness or options.robots):
-        raise InputError("--worst says which of several robots counts: give --stiffness or --robots with it")
     if options.spread:
         raise InputError("--spread goes with one robust gait, not with --table")
     if options.warm and (options.stiffness or options.robots):
@@ -323,6 +321,8 @@ def _run_table(options: argparse.Namespace) -> Answer:
     from srs_opt.robot import save_robot
 
     robots = _robots_of_table(options)
+    if options.worst and len(robots) == 1:
+        raise InputError("--worst says which of several robots counts: give --stiffness or --robots with it")
     robot = robots[0]
     model = chosen_model(options, robot)
     if options.judge:

@@ -105,7 +105,10 @@ def chosen_table(
             entry = replace(TableGait.of_orbit(name, good[0]), worst_speed_m_s=slowest, planned=planned)
             kept.append((float((speeds / scale).min()), entry))
     if not any(entry.planned for _, entry in kept):
-        raise NoAnswerError("no gait of the table serves all of the robots")
+        each = "; ".join(robot.name for robot in robots)
+        raise NoAnswerError(
+            f"no gait of the table serves all of the robots ({each}): narrow their range of stiffness"
+        )
     # images of one gait stay together, forward first; what planners do not use comes last
     kept.sort(key=lambda pair: (not pair[1].planned, -round(pair[0], 3)))
     if len(robots) > 1:

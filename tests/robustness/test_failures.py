@@ -168,7 +168,7 @@ CASES = [
     ("srs_opt.gait_opt", ["--stiffness", "0"], 2, "--stiffness"),
     ("srs_opt.gait_opt", ["--stiffness", "0.005", "--model", "complex"], 2, "--model compliant"),
     ("srs_opt.gait_opt", ["--stiffness", "0.005", "--table", "--warm", "x.json"], 2, "--table --warm"),
-    ("srs_opt.gait_opt", ["--worst", "relative", "--table"], 2, "--worst"),
+    ("srs_opt.gait_opt", ["--worst", "relative", "--table", "--model", "complex"], 2, "--worst"),
     ("srs_opt.gait_opt", ["--spread", "1.5"], 2, "--spread must be below 1"),
     ("srs_opt.gait_opt", ["--spread", "0.1", "--table"], 2, "not with --table"),
     ("srs_opt.gait_opt", ["--worst", "relative", "--objective", "transport"], 2, "--worst relative"),
