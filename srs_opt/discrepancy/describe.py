@@ -17,6 +17,7 @@ from srs_opt.calibrate.candidates import Candidate, effect_spec, entry_sd
 from srs_opt.calibrate.experiment import Experiment
 from srs_opt.calibrate.fit import Fit, start_point
 from srs_opt.calibrate.forms import form_of_entry, forms_of
+from srs_opt.discrepancy.design import NOTHING, NextExperiment, next_experiment
 from srs_opt.discrepancy.diagnostics import Diagnostics, needed_gain
 from srs_opt.discrepancy.hypothesis import Hypothesis
 from srs_opt.discrepancy.screen import Linearisation, Score, expected_start, screen
@@ -95,8 +96,7 @@ class Description:
     @property
     def sentence(self) -> str:
         """What the term says, with its fitted size."""
-        candidate, fit = self.best.candidates[0], self.best.fit
-        return self.term.sentence(effect_spec(candidate, fit.point.values), entry_sd(candidate.form, fit))
+        return _sentence(self.best)
 
 
 def describe_gap(
@@ -120,6 +120,25 @@ def describe_gap(
     if found is None or found.why_not:
         return found
     return replace(found, diagnostics=own.examine(found.best), experiment=experiment)
+
+
+def confirmation(
+    description: Description, null: Hypothesis, trials: Sequence[Trial]
+) -> NextExperiment | None:
+    """Return the trial or instrument that best tells a description from the next best, and where to look.
+
+    The next best is the best term that acts on something else or elsewhere; none: calibration alone.
+    """
+    if description.experiment is None:
+        return None
+    best = description.best
+    rivals = [h for h in description.tried if _says(h) != _says(best)]
+    other = min(rivals, key=_left, default=null)
+    found = next_experiment(description.experiment, (best, other), trials)
+    if found is None:
+        return None
+    stories = description.sentence, _sentence(other) if other.candidates else NOTHING
+    return replace(found, what=f"{found.what}; and {description.term.effect.look}", separates=stories)
 
 
 def terms_of(links: int, present: Sequence[str] = ()) -> tuple[Candidate, ...]:
@@ -225,6 +244,12 @@ def _doubt(
     if abs(off) > settings.bench:
         return f"{name} would lie {abs(off):.1f} standard deviations from its bench value"
     return ""
+
+
+def _sentence(hypothesis: Hypothesis) -> str:
+    candidate, fit = hypothesis.candidates[0], hypothesis.fit
+    spec = effect_spec(candidate, fit.point.values)
+    return TERMS[candidate.effect].sentence(spec, entry_sd(candidate.form, fit))
 
 
 def _says(hypothesis: Hypothesis) -> tuple[str, int | None]:

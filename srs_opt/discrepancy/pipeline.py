@@ -16,7 +16,7 @@ from srs_opt.calibrate.forms import form_of_entry
 from srs_opt.calibrate.model import Model
 from srs_opt.calibrate.noise import Noise, noise_of
 from srs_opt.discrepancy.alike import Pair, alike_pairs
-from srs_opt.discrepancy.describe import Description, describe_gap
+from srs_opt.discrepancy.describe import Description, confirmation, describe_gap
 from srs_opt.discrepancy.design import NextExperiment, next_experiment, repeat_of, rivals_of
 from srs_opt.discrepancy.diagnostics import Diagnostics
 from srs_opt.discrepancy.first import first_experiment
@@ -197,7 +197,7 @@ def _examine(
     *,
     restricted: bool,
 ) -> Discrepancy:
-    experiment = search.experiment
+    experiment, settings = search.experiment, SETTINGS.of_body(dataset.robot.length_m)
     tell(f"calibrating on {len(split.open)} trials")
     first = search.calibrate()
     if first is None:
@@ -206,10 +206,10 @@ def _examine(
     first = search.coloured(first)
     tell(f"screening {len(search.candidates)} candidates")
     null = search.noise_aware(search.examine(first))
-    if null.detection.p_value < SETTINGS.detected:
+    if null.detection.p_value < settings.detected:
         search, null, apart = without_odd(search, null)
         split = split.without(apart)
-    searched = null.detection.p_value < SETTINGS.detected
+    searched = null.detection.p_value < settings.detected
     best, fitted = search.run(null) if searched else (null, [null.hypothesis])
     if search.experiment.noise != experiment.noise:
         null = null if best is null else search.examine(search.again(null.hypothesis))
@@ -220,11 +220,11 @@ def _examine(
     rival = best_rival(best.hypothesis, fitted)
     opened = first.fit, best.hypothesis.fit
     gap = open_seal(experiment, *opened, split.sealed, search.seed, rival.fit if rival else None)
-    odd = odd_sealed(gap)
+    odd = odd_sealed(gap, settings)
     sealed = [t for t in split.sealed if t.name not in odd]
     if odd:
         gap = open_seal(experiment, *opened, sealed, search.seed, rival.fit if rival else None)
-    verdict = judge(null, best, selection, gap, restricted=restricted)
+    verdict = judge(null, best, selection, gap, settings, restricted=restricted)
     description = None
     if verdict.word == UNKNOWN and not restricted:
         tell(f"describing the gap with the {len(TERMS)} terms of the grammar")
@@ -234,11 +234,13 @@ def _examine(
         gap = description.gap
     following, seen = None, None
     if verdict.word == NO_GAP:
-        seen = visible(experiment, null, search.candidates, sealed)
+        seen = visible(experiment, null, search.candidates, sealed, settings)
     else:
         tell("looking for the next experiment")
-        stories = rivals_of(selection, fitted, null.hypothesis)
-        following = next_experiment(experiment, stories, split.open)
+        if verdict.word == DESCRIBED and description is not None:
+            following = confirmation(description, first, split.open)
+        else:
+            following = next_experiment(experiment, rivals_of(selection, fitted, null.hypothesis), split.open)
         if following is None:
             misfit = misfit_by_trial(null)
             worst = max((t.name for t in split.open), key=lambda n: misfit[n])

@@ -1,8 +1,11 @@
-"""When an explanation is believed: the figures that a laboratory judges by, all on sealed trials."""
+"""When an explanation is believed: the figures that a laboratory judges by, all on sealed trials.
+
+Lengths are in body lengths, so that they mean the same for a robot twice as long.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 
 @dataclass(frozen=True)
@@ -16,11 +19,12 @@ class Settings:
     ----------
     detected : float
         Level at which calibration alone is rejected.
-    left_share, left_m : float
+    left_share, left : float
         What a named set of effects may leave where what is left is significant: share of the gap (root mean
-        squares beyond the noise), and metres. Simulations and cameras leave 0.2 to 0.4 mm whatever the gap;
-        wrong sets close up to 93 % of a large gap and leave millimetres.
-    small_m, small_share : float
+        squares beyond the noise), and body lengths. Simulations and cameras leave 0.001 to 0.0017 (0.2 to
+        0.4 mm of a body of 236 mm) whatever the gap; wrong sets close up to 93 % of a large gap and leave
+        millimetres.
+    small, small_share : float
         A remainder of this size is what cameras and simulations leave: it does not count against a name as
         long as it is no larger share of the gap than `small_share`.
     speed_share : float
@@ -33,32 +37,59 @@ class Settings:
         Share of the gap by which every set without such an effect must leave more.
     part_change : float
         By how much of itself the size of such an effect may change when a third of the trials is left out.
-    negligible_m, negligible_speed : float
+    negligible, negligible_speed : float
         A gap below both is none that matters, where no effect explains it.
-    off_m : float
+    off : float
         Root mean square from which on a single sealed trial, beyond `off_times` what the others leave, is
         not one of the same experiment.
     closed, nearly_closed : float
         Of a small gap, the share of its height above the noise floor that an effect which leaves nothing
         significant may leave: `closed`, or `nearly_closed` where the 90 % interval reaches `closed`.
+    body_m : float
+        The body's length.
     """
 
     detected: float = 0.05
     left_share: float = 0.12
-    left_m: float = 8e-4
-    small_m: float = 4e-4
+    left: float = 0.0034
+    small: float = 0.0017
     small_share: float = 0.35
     speed_share: float = 0.02
     part_share: float = 0.35
     part_effects: int = 2
     part_lead: float = 0.3
     part_change: float = 0.25
-    negligible_m: float = 4e-4
+    negligible: float = 0.0017
     negligible_speed: float = 0.01
-    off_m: float = 2e-3
+    off: float = 0.0085
     off_times: float = 5.0
     closed: float = 0.25
     nearly_closed: float = 0.5
+    body_m: float = 0.236
+
+    def of_body(self, length_m: float) -> Settings:
+        """Return the rule for a robot of that length."""
+        return replace(self, body_m=length_m)
+
+    @property
+    def left_m(self) -> float:
+        """Most that a named set may leave, metres."""
+        return self.left * self.body_m
+
+    @property
+    def small_m(self) -> float:
+        """Remainder that cameras and simulations leave, metres."""
+        return self.small * self.body_m
+
+    @property
+    def negligible_m(self) -> float:
+        """Gap that does not matter, metres."""
+        return self.negligible * self.body_m
+
+    @property
+    def off_m(self) -> float:
+        """Least by which a trial is of another experiment, metres."""
+        return self.off * self.body_m
 
 
 SETTINGS = Settings()

@@ -68,6 +68,9 @@ def test_a_wheel_that_rolls_hard_is_described_by_the_command(tmp_path, few_terms
     assert abs(effect["parameters"]["excess"] - 5.0) < 4 * effect["sd"]["excess"]
     assert said["gap"]["ratio"] < 0.1
     assert said["located"][0]["where"] == "curvature to motion (ground), link 2"
+    following = said["next_experiment"]
+    assert following["separates"][0] == said["described"] and following["expected_power"] > 0.9
+    assert following["what"].endswith("turn its wheels by hand one after the other")
     robot = load_robot(out / "described_robot.yaml")
     assert robot.effects[0]["excess"] == pytest.approx(effect["parameters"]["excess"])
     assert "link 2 rolls" in (out / "report.html").read_text(encoding="utf-8")

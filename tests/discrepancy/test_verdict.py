@@ -55,6 +55,16 @@ def test_millimetres_or_a_wrong_speed_cost_it(after_m, speed):
     assert "wheel_toe" in verdict.why and "closes" in verdict.why
 
 
+def test_lengths_are_those_of_the_body():
+    """What costs a short robot's name does not cost that of one four times as long."""
+    left = gap(40e-3, 2e-3)
+    words = [
+        judge(diagnostics(1e-9, 80.0), diagnostics(1e-9, 1.05), chosen("a"), left, SETTINGS.of_body(m)).word
+        for m in (0.236, 1.0)
+    ]
+    assert words == ["unknown", "named"]
+
+
 def test_a_part_needs_a_lead_and_the_same_size_in_all_trials():
     sure = gap(9e-3, 2.5e-3, rival_m=8e-3)
     assert said(1e-9, chosen("a", change=0.05), sure).word == "named_in_part"
