@@ -109,14 +109,15 @@ def describe_gap(
     search : Search
         The one that failed.
     null, listed : Hypothesis
-        Calibration alone, and the best set of listed effects.
+        Calibration alone, and the best set of listed effects. One that physics or the bench speaks against
+        is no rival unless it leaves less.
     """
     robot = search.experiment.model.robot
     present = [Candidate(form_of_entry(e)).label for e in robot.effects]
     terms = terms_of(robot.links, present)
     experiment = search.experiment.with_generic_terms()
     own = Search(experiment, search.base, terms, search.trials, search.seed, search.report, search.quick)
-    found = describe(own, null.fit, listed.fit, sealed)
+    found = describe(own, null.fit, listed, sealed)
     if found is None or found.why_not:
         return found
     return replace(found, diagnostics=own.examine(found.best), experiment=experiment)
@@ -148,7 +149,7 @@ def terms_of(links: int, present: Sequence[str] = ()) -> tuple[Candidate, ...]:
 
 
 def describe(
-    search: Search, null: Fit, listed: Fit, sealed: Sequence[Trial], settings: Settings = DEFAULT
+    search: Search, null: Fit, listed: Hypothesis, sealed: Sequence[Trial], settings: Settings = DEFAULT
 ) -> Description | None:
     """Return the best description; None where no term can be fitted.
 
@@ -156,8 +157,10 @@ def describe(
     ----------
     search : Search
         With the terms as candidates.
-    null, listed : Fit
-        Calibration alone, and the best set of listed effects, of the same trials.
+    null : Fit
+        Calibration alone.
+    listed : Hypothesis
+        The best set of listed effects, of the same trials.
     sealed : sequence of Trial
     """
     tried = sorted(_fitted(search, null, settings), key=_left)
@@ -224,14 +227,15 @@ def _doubt(
     gap: Gap | None,
     tried: Sequence[Hypothesis],
     null: Fit,
-    listed: Fit,
+    listed: Hypothesis,
     family: int,
     settings: Settings,
 ) -> str:
     """Return why a description is not believed; empty when nothing is against it."""
     if null.deviance - found.deviance < needed_gain(found.candidates[0], family):
         return "it gains no more than the best of as many terms does by chance"
-    if _left(found) > settings.lead * max(listed.misfit_ratio - 1, 1e-3):
+    lead = 1.0 if listed.candidates and listed.implausible() else settings.lead
+    if _left(found) > lead * _left(listed):
         return "listed effects do about as well"
     if gap is None or gap.ratio is None or gap.ratio > 1 - settings.closes:
         closed = 0.0 if gap is None or gap.ratio is None else 1 - gap.ratio

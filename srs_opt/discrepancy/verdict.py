@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from srs_opt.discrepancy.diagnostics import ADEQUATE, Diagnostics, explained
+from srs_opt.discrepancy.locate import left_places
 from srs_opt.discrepancy.seal import Gap
 from srs_opt.discrepancy.select import Selection
 from srs_opt.discrepancy.settings import SETTINGS, Settings
@@ -12,6 +13,7 @@ from srs_opt.discrepancy.settings import SETTINGS, Settings
 NO_GAP, NAMED, ONE_OF, UNKNOWN, NOT_TESTABLE = "no_gap", "named", "one_of", "unknown", "not_testable"
 NAMED_IN_PART, DESCRIBED = "named_in_part", "described"
 BELIEVED = (NAMED, NAMED_IN_PART, DESCRIBED)
+UNSEEN_M = 2e-5  # no camera sees less
 
 
 @dataclass(frozen=True)
@@ -148,9 +150,13 @@ def _small(gap: Gap) -> str:
 
 def _further(best: Diagnostics, gap: Gap | None) -> str:
     """Return what is told beside a name: a remainder that is significant."""
-    if gap is None or best.adequate or gap.after.m < 2e-5:
+    if gap is None or best.adequate or gap.after.m < UNSEEN_M:
         return ""
-    return f"; a further {1e3 * gap.after.m:.2g} mm{_in_speed(gap.after.speed_share)} is something else"
+    closes = "" if gap.share is None else f"it closes {max(1 - gap.share, 0.0):.1%} of it, "
+    left = f"{1e3 * gap.after.m:.2g} mm{_in_speed(gap.after.speed_share)}"
+    places = left_places(best)
+    where = f", mostly in {places[0].where}, varying with {places[0].against}" if places else ""
+    return f"; {closes}a further {left} is something else{where}"
 
 
 def _closing(gap: Gap | None) -> str:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from srs_opt.discrepancy.design import proposals, repeat_of
+from srs_opt.discrepancy.functions import Group
 from srs_opt.discrepancy.seal import Gap, Remainder
 from srs_opt.discrepancy.settings import SETTINGS
 from srs_opt.discrepancy.verdict import judge
@@ -14,8 +15,10 @@ from srs_opt.measurement.records import Trial
 
 def diagnostics(p, misfit=1.0):
     fit = SimpleNamespace(misfit_ratio=misfit)
+    shares = SimpleNamespace(improvement=90.0, dof=4), SimpleNamespace(improvement=40.0, dof=2)
     return SimpleNamespace(
-        detection=SimpleNamespace(p_value=p),
+        detection=SimpleNamespace(p_value=p, groups=shares, adjusted=(p, p)),
+        groups=(Group("motion along", "gait phase", (0, 1, 2, 3)), Group("heading", "time", (4, 5))),
         adequate=p > 0.01,
         scores=(),
         hypothesis=SimpleNamespace(fit=fit),
@@ -45,7 +48,8 @@ def said(left_p, *arguments, misfit=1.05, **options):
 def test_a_significant_but_small_remainder_does_not_cost_the_name_and_is_told_beside_it():
     verdict = said(1e-9, chosen("wheel_toe"), gap(9.5e-3, 0.12e-3))
     assert verdict.word == "named"
-    assert "a further 0.12 mm" in verdict.why
+    assert "closes 98.7% of it, a further 0.12 mm" in verdict.why
+    assert verdict.why.endswith("is something else, mostly in motion along, varying with gait phase")
 
 
 @pytest.mark.parametrize(("after_m", "speed"), [(2e-3, 0.0), (5e-3, 0.0), (0.3e-3, 0.05)])
