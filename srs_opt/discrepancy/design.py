@@ -9,7 +9,7 @@ import numpy as np
 
 from srs_opt.calibrate.experiment import Experiment, Point
 from srs_opt.calibrate.instruments import check_expectations
-from srs_opt.calibrate.normal_equations import NormalEquations, bounded_solve
+from srs_opt.calibrate.normal_equations import bounded_solve
 from srs_opt.discrepancy.hypothesis import Hypothesis
 from srs_opt.discrepancy.select import Selection
 from srs_opt.errors import NoAnswerError
@@ -105,12 +105,11 @@ def next_experiment(
     return NextExperiment(what, names, round(power(gain), 3))
 
 
-def repeat_of(trial: str, equations: Mapping[str, NormalEquations], other: str) -> NextExperiment:
+def repeat_of(trial: str, gain: float, other: str) -> NextExperiment:
     """Return that a trial be repeated: a wrong entry does not come twice.
 
-    Its power is that of the misfit to come again.
+    Its power is that of the misfit to come again, of which `gain` is the deviance.
     """
-    gain = equations[trial].misfit - equations[trial].count if trial in equations else 0.0
     what = f"repeat trial {trial}, and check its entry in the notebook"
     return NextExperiment(what, (f"a wrong entry of {trial}", other), round(power(gain), 3))
 

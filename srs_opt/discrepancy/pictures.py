@@ -9,11 +9,14 @@ import numpy as np
 from srs_opt.calibrate.noise import track_of
 from srs_opt.discrepancy.locate import misfit_by_trial
 from srs_opt.discrepancy.seal import sealed_residuals
+from srs_opt.discrepancy.words import with_what
 from srs_opt.figures import COLOURS, PAGE_IN, Picture, encoded, styled
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from srs_opt.discrepancy.describe import Description
     from srs_opt.discrepancy.pipeline import Discrepancy
 
 AFTER, BEFORE = COLOURS[:2]
@@ -25,6 +28,8 @@ def pictures(found: Discrepancy) -> list[Picture]:
     if found.null is None or found.best is None or found.shown_in is None or found.selection is None:
         return []
     drawn = [_candidates(found), _trials(found)]
+    if found.description is not None and found.description.tried:
+        drawn.insert(1, _terms(found.description))
     return [_sealed(found), *drawn] if found.split.sealed else drawn
 
 
@@ -35,10 +40,10 @@ def gap_picture(found: Discrepancy) -> Picture | None:
         return None
     return encoded(
         drawn,
-        "The gap closes",
-        "A trial that no fit saw. Left: the body at its end, as measured and as predicted with and without "
-        "the effect (thin: the way of the markers' mean). Right: root mean square distance per coordinate "
-        "over a fifth of a second.",
+        "The gap closes" if found.believed else "What the best explanation so far does to the gap",
+        "A trial that no fit saw. Left: the body at its end, as measured and as predicted by both models "
+        "(thin: the way of the markers' mean). Right: root mean square distance per coordinate over a fifth "
+        "of a second.",
     )
 
 
@@ -58,10 +63,10 @@ def gap_figure(found: Discrepancy) -> Figure | None:
     room, course = figure.subplots(1, 2, width_ratios=(1.0, 1.2))
     last = int(np.flatnonzero(np.isfinite(track).all(axis=1))[-1]) if np.isfinite(track).all(1).any() else -1
     measured = track.reshape(len(track), -1, 2)
-    for residual, label, colour in zip(residuals, ("calibration alone", "with the effect"), (BEFORE, AFTER)):
+    for residual, label, colour in zip(residuals, _labels(found), (BEFORE, AFTER)):
         points = 1e3 * (track - residual).reshape(len(track), -1, 2)
         room.plot(*middle(points).T, color=colour, lw=0.8, alpha=0.6)
-        room.plot(*points[last].T, "-", color=colour, lw=2.0, label=label)
+        room.plot(*points[last].T, "-", color=colour, lw=2.0)
         course.plot(trial.time_s, 1e3 * _rolling(residual), color=colour, label=label)
     room.plot(*(1e3 * measured[last]).T, "o", mfc="none", color="k", ms=4, label="measured")
     room.plot(*(1e3 * middle(measured)).T, color="k", lw=0.8, ls=":")
@@ -69,13 +74,31 @@ def gap_figure(found: Discrepancy) -> Figure | None:
     room.set_xlabel("x (mm)")
     room.set_ylabel("y (mm)")
     course.axhline(1e3 * found.gap.noise_floor, color="k", lw=0.8, ls="--", label="noise floor")
-    course.set_yscale("log")
+    _log(course)
     course.set_xlabel("time (s)")
     course.set_ylabel("distance to the markers (mm)")
     course.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
-    room.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
-    room.set_title(f"{trial.name}, the body after {trial.time_s[last]:.1f} s", pad=26)
+    room.legend(loc="best")
+    room.set_title(f"{trial.name}, the body after {trial.time_s[last]:.1f} s")
     return figure
+
+
+def _log(axis: Axes) -> None:
+    """Make the axis of values logarithmic, with plain numbers on it where there is room."""
+    from matplotlib.ticker import LogFormatter
+
+    class Plain(LogFormatter):
+        def __call__(self, x: float, pos: int | None = None) -> str:
+            return f"{x:g}" if super().__call__(x, pos) else ""
+
+    axis.set_yscale("log")
+    axis.yaxis.set_major_formatter(Plain())
+    axis.yaxis.set_minor_formatter(Plain())
+
+
+def _labels(found: Discrepancy) -> tuple[str, str]:
+    """Return what the two models of a picture are called."""
+    return "calibration alone", with_what(found)
 
 
 def middle(points: np.ndarray) -> np.ndarray:
@@ -98,8 +121,7 @@ def _sealed(found: Discrepancy) -> Picture:
     fits = [found.null.hypothesis.fit, found.selection.best.fit]
     figure = _figure(PAGE_IN, 0.9 + 1.2 * len(trials))
     axes = figure.subplots(len(trials), 1, sharex=True, squeeze=False)[:, 0]
-    labels = ("calibration alone", "with the effect")
-    colours = (BEFORE, AFTER)
+    labels, colours = _labels(found), (BEFORE, AFTER)
     shown = 2 if found.selection.best.candidates else 1
     for fit, label, colour in list(zip(fits, labels, colours))[:shown]:
         for axis, trial, residual in zip(axes, trials, sealed_residuals(found.shown_in, fit, trials)):
@@ -149,22 +171,38 @@ def _candidates(found: Discrepancy) -> Picture:
     )
 
 
+def _terms(description: Description) -> Picture:
+    """Draw what every term of the grammar that was fitted leaves of the misfit."""
+    tried = description.tried[::-1]
+    figure = _figure(PAGE_IN, 0.7 + 0.2 * len(tried))
+    axis = figure.subplots()
+    left = [max(h.fit.misfit_ratio - 1, 1e-3) for h in tried]
+    colours = [AFTER if h.label == description.best.label else "0.7" for h in tried]
+    axis.barh([h.label.removeprefix("generic_") for h in tried], left, color=colours)
+    axis.set_xscale("log")
+    axis.set_xlabel("misfit that is left / noise variance")
+    return encoded(
+        figure,
+        "What each term of the grammar leaves",
+        "Those that were fitted, to the start of a few trials; blue: the best. Place in brackets.",
+    )
+
+
 def _trials(found: Discrepancy) -> Picture:
     """Draw the misfit of every open trial, before and after."""
-    from matplotlib.ticker import LogFormatter
-
     assert found.null is not None and found.best is not None
     before, after = misfit_by_trial(found.null), misfit_by_trial(found.best)
     names = [t.name for t in found.split.open]
     place = np.arange(len(names))
     figure = _figure(PAGE_IN, 2.4)
     axis = figure.subplots()
-    axis.semilogy(place, [before[n] for n in names], "o", color=BEFORE, label="calibration alone")
-    axis.semilogy(place, [after[n] for n in names], "s", mfc="none", color=AFTER, label="best set of effects")
+    alone, added = _labels(found)
+    axis.plot(place, [before[n] for n in names], "o", color=BEFORE, label=alone)
+    if found.best.hypothesis.candidates:
+        axis.plot(place, [after[n] for n in names], "s", mfc="none", color=AFTER, label=added)
     axis.axhline(1, color="k", ls="--", lw=0.8)
     axis.set_xticks(place, names, rotation=60)
     axis.set_ylabel("misfit / noise variance")
-    axis.yaxis.set_major_formatter(LogFormatter())
-    axis.yaxis.set_minor_formatter(LogFormatter())
+    _log(axis)
     axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
     return encoded(figure, "Every open trial", "1 is what noise alone leaves.")

@@ -7,6 +7,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from srs_opt.calibrate.apart import stands_apart
 from srs_opt.calibrate.candidates import Candidate, all_candidates, fitted_coordinates
 from srs_opt.calibrate.clean import mended
@@ -14,7 +16,7 @@ from srs_opt.calibrate.experiment import Experiment
 from srs_opt.calibrate.fit import Fit
 from srs_opt.calibrate.forms import form_of_entry
 from srs_opt.calibrate.model import Model
-from srs_opt.calibrate.noise import Noise, noise_of
+from srs_opt.calibrate.noise import Noise, noise_of, track_of
 from srs_opt.discrepancy.alike import Pair, alike_pairs
 from srs_opt.discrepancy.describe import Description, confirmation, describe_gap
 from srs_opt.discrepancy.design import NextExperiment, next_experiment, repeat_of, rivals_of
@@ -26,7 +28,7 @@ from srs_opt.discrepancy.screen import Score
 from srs_opt.discrepancy.seal import Gap, odd_sealed, open_seal
 from srs_opt.discrepancy.search import Search
 from srs_opt.discrepancy.select import Selection, best_rival, select
-from srs_opt.discrepancy.settings import SETTINGS
+from srs_opt.discrepancy.settings import SETTINGS, Settings
 from srs_opt.discrepancy.split import Split, few_and_brief, split_trials
 from srs_opt.discrepancy.verdict import BELIEVED, DESCRIBED, NO_GAP, NOT_TESTABLE, UNKNOWN, Verdict, judge
 from srs_opt.discrepancy.visible import Visible, visible
@@ -242,9 +244,7 @@ def _examine(
         else:
             following = next_experiment(experiment, rivals_of(selection, fitted, null.hypothesis), split.open)
         if following is None:
-            misfit = misfit_by_trial(null)
-            worst = max((t.name for t in split.open), key=lambda n: misfit[n])
-            following = repeat_of(worst, null.linearisation.equations, "something that the model lacks")
+            following = _repeat(null, split, gap, settings)
     if verdict.word == DESCRIBED and description is not None and description.diagnostics is not None:
         best = description.diagnostics  # what the report shows, in a model that knows the term
         selection = Selection(best.hypothesis, (), {})
@@ -269,6 +269,24 @@ def _examine(
         tuple(odd.items()),
         seen,
     )
+
+
+def _repeat(null: Diagnostics, split: Split, gap: Gap | None, settings: Settings) -> NextExperiment:
+    """Return that the trial which calibration alone misses most be repeated.
+
+    A sealed one where the open ones show nothing.
+    """
+    other = "something that the model lacks"
+    missed = gap.before.by_trial if gap is not None else {}
+    if gap is not None and missed and null.detection.p_value >= settings.detected:
+        worst = max(missed, key=lambda n: missed[n])
+        track = next(track_of(t) for t in split.sealed if t.name == worst)
+        count = 0 if track is None else int(np.isfinite(track).sum())
+        return repeat_of(worst, count * (missed[worst] / gap.noise_floor) ** 2, other)
+    misfit = misfit_by_trial(null)
+    worst = max((t.name for t in split.open), key=lambda n: misfit[n])
+    equations = null.linearisation.equations[worst]
+    return repeat_of(worst, equations.misfit - equations.count, other)
 
 
 def without_odd(search: Search, null: Diagnostics) -> tuple[Search, Diagnostics, dict[str, str]]:

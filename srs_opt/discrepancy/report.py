@@ -149,6 +149,11 @@ def caveats(found: Discrepancy) -> list[str]:
             f"Something is left (p = {found.best.detection.p_value:.2g}), {how_much_is_left(found.best)}: "
             "too little to count against the name."
         )
+    if found.verdict.word == UNKNOWN and found.description is not None:
+        said = found.description
+        notes.append(
+            f"Of the grammar's terms one would say best: {said.sentence}. Not believed: {said.why_not}."
+        )
     if not found.split.new_gaits:
         notes.append(
             "The set holds too few gaits to seal one: the sealed trials repeat gaits that were fitted: "
