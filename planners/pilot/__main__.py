@@ -108,7 +108,7 @@ def _files(
 
     execution = driven.execution
     return (
-        *save_figure(plan_figure(problem, plan, execution.pose[:, :2]), out / "plan"),
+        *save_figure(plan_figure(problem, plan, execution), out / "plan"),
         save_motion(out / "motion.json", problem, plan, execution),
         write_dataset(driven.log, out / "dataset", problem.robot, driven.latency.value_s),
         write_json(out / "pilot.json", record),

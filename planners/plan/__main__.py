@@ -193,8 +193,7 @@ def _pictures(options: argparse.Namespace, route: Route, execution: Execution | 
     from srs_opt.figures import save_figure
 
     problem, plan = route.problem, route.plan
-    driven = None if execution is None else execution.pose[:, :2]
-    files = [*save_figure(plan_figure(problem, plan, driven), options.out / "plan")]
+    files = [*save_figure(plan_figure(problem, plan, execution), options.out / "plan")]
     files.append(save_motion(options.out / "motion.json", problem, plan, execution))
     if options.ros_path:
         files.append(save_ros_path(plan, options.ros_path))

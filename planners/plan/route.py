@@ -140,7 +140,7 @@ class DrivenRoute(Result):
         """Return the picture of the plan with the way that was driven."""
         from planners.view.picture import plan_figure
 
-        return plan_figure(self.route.problem, self.route.plan, self.execution.pose[:, :2])
+        return plan_figure(self.route.problem, self.route.plan, self.execution)
 
 
 def plan(

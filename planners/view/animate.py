@@ -13,6 +13,7 @@ from planners.plan.answer import Plan
 from planners.search.problem import Problem
 from planners.view.animation_path import check_animation_path
 from planners.view.picture import gait_colors
+from srs_opt.figures import plain_names
 from srs_opt.files import atomic_path
 
 if TYPE_CHECKING:
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 FRAMES_PER_S = 20
 MAX_FRAMES = 600
 LONG_SIDE_INCHES = 7.0
+HOLD_S = 1.5  # that the last picture stays
 
 
 def save_animation(path: Path, problem: Problem, plan: Plan, execution: Execution | None = None) -> Path:
@@ -31,7 +33,7 @@ def save_animation(path: Path, problem: Problem, plan: Plan, execution: Executio
     InputError
         For an unknown ending, or .mp4 without ffmpeg.
     """
-    from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
+    from matplotlib.animation import FFMpegWriter, FuncAnimation
     from matplotlib.figure import Figure
     from matplotlib.patches import Polygon
 
@@ -46,10 +48,11 @@ def save_animation(path: Path, problem: Problem, plan: Plan, execution: Executio
     draw_maze(axes, problem.maze)
     axes.set_xlabel("")
     axes.set_ylabel("")
-    colors = gait_colors(problem, problem.motion.rows((*plan.gaits, *(execution.gaits if execution else ()))))
+    colors = gait_colors(problem.motion.rows((*plan.gaits, *(execution.gaits if execution else ()))))
     body = Polygon(np.zeros((3, 2)), closed=True, edgecolor="#202020", linewidth=0.6, zorder=5)
     axes.add_patch(body)
     (trail,) = axes.plot([], [], color="#202020", linewidth=0.8, zorder=4)
+    (head,) = axes.plot([], [], "o", color="white", markeredgecolor="#202020", markersize=3.5, zorder=6)
     title = axes.set_title("", fontsize=9)
 
     def draw(frame: int) -> tuple[Any, ...]:
@@ -57,16 +60,31 @@ def save_animation(path: Path, problem: Problem, plan: Plan, execution: Executio
         outline = shapely.LineString(lines[k]).buffer(problem.body.half_width_m, quad_segs=6)
         body.set_xy(np.asarray(outline.exterior.coords))
         body.set_facecolor(colors[int(gait[k])])
+        head.set_data(lines[k, -1:, 0], lines[k, -1:, 1])
         trail.set_data(pose[: k + 1, 0], pose[: k + 1, 1])
         title.set_text(f"{time[k]:5.1f} s   {problem.gaits.gaits[int(gait[k])].name}")
-        return body, trail, title
+        return body, trail, head, title
 
-    animation = FuncAnimation(figure, draw, frames=frames, interval=1000 / FRAMES_PER_S)
     rate = frames / max(time[-1], 1e-3)
+    held = [*range(frames), *[frames - 1] * round(HOLD_S * rate)]  # at the end, before it begins anew
+    plain_names(figure)
+    animation = FuncAnimation(figure, draw, frames=held, interval=1000 / FRAMES_PER_S)
     movie = path.suffix.lower() == ".mp4"
     with atomic_path(path) as temporary:
-        animation.save(str(temporary), writer=(FFMpegWriter if movie else PillowWriter)(fps=max(rate, 1)))
+        animation.save(str(temporary), writer=(FFMpegWriter if movie else _gif_writer())(fps=max(rate, 1)))
     return path
+
+
+def _gif_writer() -> Any:
+    """Return matplotlib's writer of GIFs, which without a frame (Ctrl-C) has nothing to finish."""
+    from matplotlib.animation import PillowWriter
+
+    class Writer(PillowWriter):
+        def finish(self) -> None:
+            if self._frames:  # type: ignore[attr-defined]
+                super().finish()
+
+    return Writer
 
 
 def _motion(plan: Plan, problem: Problem, execution: Execution | None) -> tuple[Any, Any, Any, Any]:

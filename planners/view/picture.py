@@ -1,4 +1,4 @@
-"""The maze with the swept body coloured by gait, and the clearance along the way."""
+"""The maze with the swept body coloured and numbered by gait, and the clearance along the way."""
 
 from __future__ import annotations
 
@@ -20,21 +20,26 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from planners.drive.execute import Execution
+
 BODY_STEP_S = 0.04  # between the bodies whose union is the swept region
 SHOWN_CLEARANCE_M = 0.1
+LEAST_LABELLED = 0.4  # body lengths of way with one gait: numbers nearer to each other would overlap
 PATH, DRIVEN = "#202020", RIGHT
 
 
 @styled
-def plan_figure(problem: Problem, plan: Plan, driven: NDArray[Any] | None = None) -> Figure:
+def plan_figure(problem: Problem, plan: Plan, driven: Execution | None = None) -> Figure:
     """Return the picture of a plan: maze with swept body above, clearance below.
+
+    Gaits are coloured, and numbered on the path, in the order in which the plan comes to them.
 
     Parameters
     ----------
     problem : Problem
     plan : Plan
-    driven : array (n, 2), optional
-        Way of the centre of mass when it was driven.
+    driven : Execution, optional
+        How it was driven.
     """
     from matplotlib.figure import Figure
 
@@ -47,43 +52,36 @@ def plan_figure(problem: Problem, plan: Plan, driven: NDArray[Any] | None = None
     c = plan.certificate
     above.plot(c.pose[:, 0], c.pose[:, 1], color=PATH, linewidth=0.8, zorder=4, label="centre of mass")
     if driven is not None:
-        above.plot(driven[:, 0], driven[:, 1], "--", color=DRIVEN, linewidth=1, zorder=5, label="driven")
+        above.plot(*driven.pose[:, :2].T, "--", color=DRIVEN, linewidth=1, zorder=5, label="driven")
     figure.legend(
-        *_sorted_handles(above, problem, colors),
         loc="outside right upper",
         title=f"{problem.maze.name}: {plan.duration_s:.1f} s, {plan.length_m:.2f} m",
         title_fontsize=8,
     )
     draw_clearance(below, problem, plan, colors)
+    if driven is not None:
+        _draw_driven_clearance(below, problem, driven)
     return figure
 
 
-def gait_colors(problem: Problem, gaits: Iterable[int]) -> dict[int, Any]:
-    """Return a colour for every gait used, dark to light as they turn from left to right."""
+def gait_colors(gaits: Iterable[int]) -> dict[int, Any]:
+    """Return a colour for every gait used, dark to light in the order of their first use."""
     import matplotlib
 
-    turn = {gait: problem.gaits.gaits[gait].turn_rate_rad_s for gait in gaits}
-    ranked = sorted(turn, key=lambda gait: -turn[gait])
-    shades = np.linspace(0.0, 0.95, max(len(ranked), 2))
+    order = list(dict.fromkeys(gaits))
+    shades = np.linspace(0.0, 0.95, max(len(order), 2))
     palette = matplotlib.colormaps[SEQUENTIAL]
-    return {gait: palette(shade) for gait, shade in zip(ranked, shades)}
-
-
-def _sorted_handles(axes: Axes, problem: Problem, colors: dict[int, Any]) -> tuple[list[Any], list[str]]:
-    """Return the legend's handles and labels: gaits from left to right turns, then the lines."""
-    order = [problem.gaits.gaits[gait].name for gait in colors]
-    pairs = list(zip(*axes.get_legend_handles_labels()))
-    pairs.sort(key=lambda pair: order.index(pair[1]) if pair[1] in order else len(order))
-    return [handle for handle, _ in pairs], [label for _, label in pairs]
+    return {gait: palette(shade) for gait, shade in zip(order, shades)}
 
 
 def draw_swept(axes: Axes, problem: Problem, plan: Plan) -> dict[int, Any]:
-    """Fill the region that the body sweeps, coloured by gait; return the colours."""
+    """Fill the region that the body sweeps, coloured and numbered by gait; return the colours."""
     from matplotlib.patches import PathPatch
     from matplotlib.path import Path as Outline
 
     played = problem.motion.rows(plan.gaits)
-    colors = gait_colors(problem, played)
+    colors = gait_colors(played)
+    number = {gait: k for k, gait in enumerate(colors, start=1)}
     c = plan.certificate
     labelled: set[int] = set()
     first = 0
@@ -103,8 +101,9 @@ def draw_swept(axes: Axes, problem: Problem, plan: Plan) -> dict[int, Any]:
             for part in shapely.get_parts(region)
             for ring in (part.exterior, *part.interiors)
         ]
-        label = None if gait in labelled else problem.gaits.gaits[gait].name
+        label = None if gait in labelled else f"{number[gait]}  {problem.gaits.gaits[gait].name}"
         labelled.add(gait)
+        _number(axes, c.pose[inside, :2], number[gait], LEAST_LABELLED * problem.robot.length_m)
         axes.add_patch(
             PathPatch(
                 Outline.make_compound_path(*rings),
@@ -129,11 +128,30 @@ def draw_clearance(axes: Axes, problem: Problem, plan: Plan, colors: dict[int, A
         inside = (c.cycle >= first) & (c.cycle < first + count)
         first += count
         axes.plot(c.time_s[inside], room[inside], color=colors[gait], linewidth=1.2)
-    axes.axhline(1e3 * problem.margin_m, color=DRIVEN, linewidth=0.8, linestyle="--")
+    axes.axhline(1e3 * problem.margin_m, color=PATH, linewidth=0.8, linestyle=":")
     axes.set_ylim(bottom=0)
     axes.set_xlabel("time (s)")
     axes.set_ylabel("clearance (mm)")
-    axes.set_title("clearance of the body, cut off at 100 mm; dashed: margin", fontsize=8)
+    axes.set_title("clearance of the body, cut off at 100 mm; dotted: margin", fontsize=8)
+
+
+def _draw_driven_clearance(axes: Axes, problem: Problem, driven: Execution) -> None:
+    room = 1e3 * clearances(problem, driven.lines, SHOWN_CLEARANCE_M).clip(max=SHOWN_CLEARANCE_M)
+    axes.plot(driven.time_s, room, "--", color=DRIVEN, linewidth=1)
+    axes.set_title("clearance of the body, cut off at 100 mm; dashed: driven, dotted: margin", fontsize=8)
+
+
+def _number(axes: Axes, way: NDArray[Any], number: int, least_m: float) -> None:
+    """Write a gait's number beside the middle of the way (n, 2) that it takes, if there is room."""
+    from matplotlib.patheffects import withStroke
+
+    if np.hypot(*np.diff(way, axis=0).T).sum() < least_m:
+        return
+    x, y = way[len(way) // 2]
+    axes.text(
+        float(x), float(y), str(number), fontsize=6, ha="center", va="center", zorder=6,
+        path_effects=[withStroke(linewidth=2, foreground="white")],
+    )  # fmt: skip
 
 
 def _thinned(time_s: NDArray[Any], instants: NDArray[Any]) -> NDArray[Any]:

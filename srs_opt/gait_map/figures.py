@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,11 +11,16 @@ from srs_opt.figures import PAGE_IN, SEQUENTIAL, new_figure, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.colors import Normalize
     from matplotlib.figure import Figure
 
     from srs_opt.gait_map.grid import GaitMap
 
 _MOST_PANELS = 5
+_LEVELS = 12
+# largest over smallest radius beyond which levels are equally spaced in the logarithm: a single wide turn would
+# take all levels otherwise, and the tight ones, which matter in a maze, none
+_WIDE = 3.0
 
 
 @styled
@@ -66,8 +71,19 @@ def _contours(axes: Axes, part: GaitMap, values: np.ndarray, label: str) -> None
         return
     axes.set_xlabel("frequency (Hz)")
     axes.set_ylabel("pressure (kPa)")
-    filled = axes.contourf(frequency, pressure, table, 12, cmap=SEQUENTIAL)
+    levels, norm = _levels(table) if label.startswith("radius") else (_LEVELS, None)
+    filled = axes.contourf(frequency, pressure, table, levels, cmap=SEQUENTIAL, norm=norm)
     shown = np.asarray(filled.levels)[::2]
     lines = axes.contour(frequency, pressure, table, shown, colors="white", linewidths=0.5)
-    bar = axes.figure.colorbar(filled, ax=axes, label=label, ticks=shown)
+    bar = axes.figure.colorbar(filled, ax=axes, label=label, ticks=shown, format="%.3g")
     bar.add_lines(lines)  # labels within the map would be cut off at its edges
+
+
+def _levels(table: np.ndarray) -> tuple[Any, Normalize | None]:
+    """Return what `contourf` takes for its levels and its norm."""
+    from matplotlib.colors import LogNorm
+
+    least, most = float(np.nanmin(table)), float(np.nanmax(table))
+    if not most > _WIDE * least > 0:
+        return _LEVELS, None
+    return np.geomspace(least, most, _LEVELS), LogNorm(least, most)

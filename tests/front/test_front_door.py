@@ -65,6 +65,30 @@ def test_the_ten_lines_find_what_is_known(results):
     assert results["gait_for"].speed_m_s == pytest.approx(0.15, abs=1e-3)
 
 
+def test_the_picture_numbers_the_gaits_along_the_path_and_shows_the_driven_clearance(results):
+    above, below = results["drive_plan"].plot()
+    gaits = dict.fromkeys(results["plan"].problem.motion.rows(results["plan"].plan.gaits))
+    labels = [text.get_text() for text in above.figure.legends[0].get_texts()]
+    numbers = [label.split()[0] for label in labels if label[0].isdigit()]
+    assert numbers == [str(k) for k in range(1, len(gaits) + 1)]
+    assert {"1"} <= {text.get_text() for text in above.texts} - {""} <= set(numbers)
+    assert sum(line.get_linestyle() == "--" for line in below.lines) == 1
+
+
+def test_ctrl_c_while_an_animation_is_written_is_ctrl_c(results, tmp_path, monkeypatch):
+    from matplotlib.figure import Figure
+
+    from planners.view.animate import save_animation
+
+    def interrupted(*arguments, **options):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Figure, "savefig", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        save_animation(tmp_path / "film.gif", results["plan"].problem, results["plan"].plan)
+    assert not list(tmp_path.iterdir())
+
+
 def test_no_way_is_told(robot):
     route = srs.plan(MAZE.with_name("no_way.yaml"), robot)
     assert not route.solved
