@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
 _MOST_PANELS = 5
 _LEVELS = 12
-# largest over smallest radius beyond which levels are equally spaced in the logarithm: a single wide turn would
-# take all levels otherwise, and the tight ones, which matter in a maze, none
+# largest over smallest radius beyond which levels are equally spaced in the logarithm: otherwise a wide turn
+# would take all levels, and the tight ones, which matter in a maze, none
 _WIDE = 3.0
 
 
