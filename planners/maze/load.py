@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from codecs import BOM_UTF8
+from collections.abc import Callable
 from pathlib import Path
 
 from planners.maze.barn import read_world
@@ -41,6 +42,8 @@ KNOWN = (
     "a BARN .world"
 )
 HEAD_BYTES = 4096
+Reader = Callable[[str, "float | None", RobotSize], Maze]
+_own: dict[str, Reader] = {}
 _POSTS = re.compile(rb"[o+O.]((---|   )[o+O.])+")
 _SIX_NUMBERS = re.compile(rb"\d+(\s+\d+){5}")
 
@@ -91,8 +94,31 @@ def load_maze(
     return maze.with_places(start, goal)
 
 
+def register_maze_format(ending: str, read: Reader) -> None:
+    """Make a maze format of one's own known by its files' ending; it is asked before the others.
+
+    Parameters
+    ----------
+    ending : str
+        With its point, in lower case.
+    read : callable
+        From the path, the cell size or None, and the robot's size, to a `Maze`; lengths in metres.
+
+    Raises
+    ------
+    InputError
+        If the ending is taken or is none.
+    """
+    if not re.fullmatch(r"\.[a-z0-9]+", ending):
+        raise InputError(f"maze format '{ending}': expected an ending such as .maze, in lower case")
+    if ending in ENDINGS or _own.setdefault(ending, read) is not read:
+        raise InputError(f"maze format '{ending}': this ending is taken")
+
+
 def _read(path: str, cell_m: float | None, size: RobotSize, unknown: Unknown) -> Maze:
     file, number = _scenario_number(path)
+    if own := _own.get(Path(file).suffix.lower()):
+        return own(file, cell_m, size)
     kind = _kind(file)
     if cell_m is not None and kind in ("yaml", "world"):
         raise InputError(f"{path}: has its own lengths, a cell size does not apply; use --scale to resize it")
