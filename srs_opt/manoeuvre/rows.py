@@ -22,7 +22,9 @@ from srs_opt.simulate.integrate import Integrator
 from srs_opt.simulate.shapes import centre_lines
 
 LEVER_M = 0.1  # turns angles into lengths
-SECOND_M = 0.5  # turns speeds into lengths: large enough that a violation costs more than it gains
+# Turn speeds into lengths, large enough that a violation costs more than it gains: a robot stops within a
+# fraction of a second, but the last 0.02 m/s of a fast gait take a second
+SECOND_M, GAIT_SECOND_M = 0.5, 5.0
 BEND_M2 = 0.03  # turns curvatures into lengths, likewise
 SPARE_M = 1e-4  # beyond a line, heading or wall, for the integration's error and ticks: 0.2 ms of way
 LOOK_S = 0.01  # between instants at which the body is measured; it moves 5 mm meanwhile
@@ -105,7 +107,7 @@ class RowMaker:
         if end.orbit is not None:
             wanted = end.orbit.solution.start
             for index in (3, 4):
-                rows += self._band(shot, index, wanted[index], GAIT_SPEED_M_S, SECOND_M)
+                rows += self._band(shot, index, wanted[index], GAIT_SPEED_M_S, GAIT_SECOND_M)
             largest = float(np.abs(end.orbit.kappa).max())
             for index in range(layout.kappa.start, layout.kappa.stop):
                 rows += self._band(shot, index, wanted[index], GAIT_CURVATURE_SHARE * largest, BEND_M2)

@@ -18,6 +18,7 @@ from srs_opt.manoeuvre.solve import Candidate, Solver
 from srs_opt.manoeuvre.task import Task
 from srs_opt.manoeuvre.valves import COINCIDENT_S, ValvePlan, ValveRow, gait_end
 from srs_opt.model.state import HEADING, X
+from srs_opt.orbit.steady import Orbit
 
 PLANS = 960  # simulated at most, several lengths of time per wave where the end is not merely passed
 WAVES = 30  # per start that is wanted
@@ -25,6 +26,7 @@ FREQUENCY_HZ, LAG_RAD = (1.2, 4.5), (0.6, 1.6)
 TIMES = 6  # lengths tried per wave
 FIRST_S = 0.25
 VENT_S = 0.45  # of a stop's first draft
+SETTLINGS = 3.0  # time constants that a gait takes to be reached; more only makes the longest start longer
 SETTLE_S, STAIRS = 0.1, 8  # for a change of pressure, as the planner has it
 ALIKE = 0.004  # merits of starts that are taken for the same
 
@@ -118,7 +120,14 @@ def _likely_s(task: Task) -> float:
     end = task.end
     way = abs(end.past_m or 0.0) + (math.hypot(*end.pose[:2]) if end.pose else 0.0)
     turn = abs(end.turn_rad or 0.0) + (abs(end.pose[2]) if end.pose else 0.0)
-    return 1.0 + 3.0 * way + 1.5 * turn
+    return 1.0 + 3.0 * way + 1.5 * turn + SETTLINGS * _settling_s(end.orbit)
+
+
+def _settling_s(orbit: Orbit | None) -> float:
+    """Return the time in which a disturbance of a gait decays to 1/e."""
+    if orbit is None or not 0 < orbit.largest_multiplier < 1:
+        return 0.0
+    return -orbit.gait.period_s / math.log(orbit.largest_multiplier)
 
 
 def vented(plan: ValvePlan, for_s: float) -> ValvePlan:
