@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -180,7 +181,8 @@ class Joints:
 
     def _row(self, gait: Gait, segment: int, state: int, age_s: float) -> tuple[Interval, ...] | None:
         """Return a segment's on-intervals in the joining cycle, None if there are none that will do."""
-        begin, inner = _switches(gait, segment)
+        begin, switches = _switches(gait.intervals[segment])
+        inner = list(switches)
         # what comes later than the gait's own last switch must have dwelt when the cycle ends
         latest_s = max(inner[-1], gait.period_s - self.limits.dwell_s)
         if state == 0:  # begun as the gait does, or with what its first switch leads to
@@ -269,10 +271,10 @@ def _on_ticks(robot: Robot, entry: TableGait, model: str, limits: ValveLimits) -
         return None
 
 
-def _switches(gait: Gait, segment: int) -> tuple[int, list[float]]:
+@lru_cache(maxsize=4096)  # asked of a few gaits, for every gait that may come before or after
+def _switches(intervals: tuple[Interval, ...]) -> tuple[int, tuple[float, ...]]:
     """Return a segment's valve state at the cycle's begin and its later switches in order (never none)."""
-    intervals = gait.intervals[segment]
-    inner = sorted(t for pair in intervals for t in pair if t > _SAME_S)
+    inner = tuple(sorted(t for pair in intervals for t in pair if t > _SAME_S))
     on = any(start < _SAME_S for start, _ in intervals) or any(
         _SAME_S < end < start for start, end in intervals
     )
@@ -283,7 +285,7 @@ def gait_end(gait: Gait) -> tuple[list[int], list[float]]:
     """Return every segment's valve state at the cycle's end, and for how long it has stood."""
     states, ages = [], []
     for segment in range(gait.segments):
-        begin, inner = _switches(gait, segment)
+        begin, inner = _switches(gait.intervals[segment])
         states.append(begin if len(inner) % 2 == 0 else -begin)
         ages.append(gait.period_s - inner[-1])
     return states, ages
@@ -305,10 +307,8 @@ def _ramped(cycle: Timeline, from_kpa: float, ramp_s: float, stair_s: float) -> 
     """Return a cycle with the pressure's way from what it was: stairs through the middles of the ramp."""
     to_kpa = float(cycle.pressure_kpa[0])
     stairs = math.ceil(ramp_s / stair_s - 1e-9)
-    treads = np.linspace(0.0, ramp_s, stairs + 1)
     ends = np.cumsum(cycle.duration_s)
-    edges = np.array([0.0, *treads[1:], *ends])
-    edges = np.unique(np.round(edges, 12))
+    edges = np.sort(np.concatenate([ramp_s / stairs * np.arange(stairs + 1), ends]))
     edges = edges[np.append(True, np.diff(edges) > _SAME_S)]
     edges[-1] = ends[-1]
     middles = (edges[:-1] + edges[1:]) / 2

@@ -112,6 +112,8 @@ class Certifier:
     def __init__(self, problem: Problem, root: Root | None = None) -> None:
         self.problem, self.root = problem, root or at_rest(problem)
         self._known: list[_Played] = [_Played([], []) for _ in range(LEVELS)]
+        # by level, gait and the gait before (or any before): how a cycle went tells where to step shortly
+        self._went: dict[tuple[int, int, int | None], Trajectory] = {}
 
     def certify(self, gaits: Sequence[int]) -> Certificate:
         """Judge a sequence of gaits, a cycle each."""
@@ -126,22 +128,24 @@ class Certifier:
         return certificate
 
     def _played(self, gaits: Sequence[int], levels: tuple[int, int]) -> list[list[Trajectory]]:
-        """Return the trajectories of all cycles, integrated with two levels' tolerances side by side.
+        """Return the trajectories of all cycles, integrated with two levels' tolerances.
 
         What comes after a cycle that runs into a wall for certain is nobody's plan: it is left out.
         """
-        for level in levels:
-            self._known[level].keep(gaits)
-        for index in range(len(gaits)):
-            wanting = [level for level in levels if len(self._known[level].cycles) <= index]
-            found = run_batched([self._cycle(gaits, index, level) for level in wanting])
-            for level, cycle in zip(wanting, found):
+        coarse, fine = (self._known[level] for level in levels)
+        coarse.keep(gaits)
+        fine.keep(gaits)
+        for index in range(len(gaits) + 1):  # the coarser one is a cycle ahead
+            due = [(level, k) for level, k in zip(levels, (index, index - 1)) if 0 <= k < len(gaits)]
+            due = [(level, k) for level, k in due if len(self._known[level].cycles) <= k]
+            found = run_batched([self._cycle(gaits, k, level) for level, k in due])
+            for (level, _), cycle in zip(due, found):
                 if isinstance(cycle, NoAnswerError):
                     raise cycle
                 self._known[level].cycles.append(cycle)
-            if index and self._in_a_wall(self._known[levels[1]].cycles[index]):
+            if index > 1 and self._in_a_wall(fine.cycles[index - 1]):
                 break
-        return [self._known[level].cycles[: index + 1] for level in levels]
+        return [coarse.cycles[:index], fine.cycles[:index]]
 
     def _in_a_wall(self, cycle: Trajectory) -> bool:
         """Return whether a few bodies of a cycle tell that it overlaps a wall, whatever the error is."""
@@ -158,7 +162,11 @@ class Certifier:
         state = known.cycles[index - 1].final if index else self.root.state
         timeline = problem.joints.timeline(before, now, CERTIFIED_STAIR_S / FINER ** (level / 2))
         tolerance = TOLERANCE * problem.robot.length_m / FINER**level
-        played = yield from problem.integrator.travel(timeline, state, tolerance)
+        like = self._went.get((level, now, before))
+        if like is None:
+            like = self._known[level - 1].cycles[index] if level else self._went.get((level, now, None))
+        played = yield from problem.integrator.travel(timeline, state, tolerance, like)
+        self._went[level, now, before] = self._went[level, now, None] = played
         return problem.bent(played, before, now)
 
     def _judged(

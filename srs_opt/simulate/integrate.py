@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from functools import lru_cache
-from itertools import pairwise
 
 import numpy as np
 
@@ -135,16 +134,24 @@ class Integrator:
         return run_one(self.travel(timeline, x, tolerance))
 
     def travel(
-        self, timeline: Timeline, x: np.ndarray, tolerance: float = TOLERANCE_M_S
+        self,
+        timeline: Timeline,
+        x: np.ndarray,
+        tolerance: float = TOLERANCE_M_S,
+        like: Trajectory | None = None,
     ) -> Search[Trajectory]:
-        """Do what `integrate` does, as a search: see `run_batched` for many at once."""
+        """Do what `integrate` does, as a search: see `run_batched` for many at once.
+
+        The errors of a motion `like` this one, of the same duration, tell where steps have to be short from
+        the first attempt on; what is asked of them is the same without it.
+        """
         timeline = timeline.delayed(valve_delay_s(self.robot))
         times, states, errors = [np.zeros(1)], [x[:, None]], []
         start = 0.0
         known: dict[bytes, Mesh] = {}
         for piece, key, repeats in _runs_of_alike(self.pieces(timeline)):
             p = self.pack(float(piece.pressure_kpa[0]), float(piece.frequency_hz[0]))
-            mesh = known.get(key) or Mesh.uniform(piece.duration_s, STEP_S)
+            mesh = known.get(key) or self._first_mesh(piece.duration_s, start, tolerance, like)
             done = 1
             while repeats:  # twice as many at a time while the mesh serves
                 many = min(repeats, 2 * done, MANY)
@@ -163,6 +170,17 @@ class Integrator:
             self.layout,
         )
 
+    @staticmethod
+    def _first_mesh(durations: np.ndarray, begin_s: float, tolerance: float, like: Trajectory | None) -> Mesh:
+        """Return the first guess of the steps of a piece that begins at a time."""
+        if like is None:
+            return Mesh.uniform(durations, STEP_S)
+        first, last = np.searchsorted(like.time_s, [begin_s + 1e-9, begin_s + durations.sum() - 1e-9])
+        window = slice(max(int(first) - 1, 0), int(last))
+        nodes = like.time_s[window.start : window.stop + 1].copy()
+        nodes[0], nodes[-1] = begin_s, begin_s + durations.sum()
+        return Mesh.graded(durations, np.diff(nodes), like.error_m_s[window], tolerance)
+
     def pieces(self, timeline: Timeline) -> list[Timeline]:
         """Cut a timeline into pieces of one pressure and frequency, a cycle each at most, to be integrated.
 
@@ -170,10 +188,9 @@ class Integrator:
         is one piece all the same.
         """
         if not self.actuator.linear:
-            return _pieces(timeline)
-        whole = replace(timeline, pressure_kpa=np.zeros(timeline.duration_s.size))
-        cut = np.cumsum([0, *(piece.duration_s.size for piece in _pieces(whole))])
-        return [timeline.part(slice(a, b)).at_one_pressure() for a, b in pairwise(cut)]
+            return _pieces(timeline, timeline.pressure_kpa)
+        alike = np.zeros(timeline.duration_s.size)
+        return [piece.at_one_pressure() for piece in _pieces(timeline, alike)]
 
     def _alike(
         self, x: np.ndarray, mesh: Mesh, valve: np.ndarray, p: np.ndarray, many: int, tolerance: float
@@ -232,18 +249,15 @@ def _runs_of_alike(pieces: list[Timeline]) -> list[tuple[Timeline, bytes, int]]:
     return runs
 
 
-def _pieces(timeline: Timeline, longest_phases: int = 40) -> list[Timeline]:
+def _pieces(timeline: Timeline, pressure_kpa: np.ndarray, longest_phases: int = 400) -> list[Timeline]:
     """Cut a timeline where pressure or frequency change, and at cycle ends, so that meshes can be reused."""
     pieces = []
-    start, n = 0, timeline.duration_s.size
-    elapsed = 0.0
-    for k in range(1, n + 1):
-        elapsed += timeline.duration_s[k - 1]
-        changed = k < n and (
-            timeline.pressure_kpa[k] != timeline.pressure_kpa[start]
-            or timeline.frequency_hz[k] != timeline.frequency_hz[start]
-        )
-        full = elapsed >= 1 / timeline.frequency_hz[start] - 1e-9 or k - start >= longest_phases
+    setting = list(zip(pressure_kpa.tolist(), timeline.frequency_hz.tolist()))
+    start, elapsed, n = 0, 0.0, len(setting)
+    for k, duration_s in enumerate(timeline.duration_s.tolist(), start=1):
+        elapsed += duration_s
+        changed = k < n and setting[k] != setting[start]
+        full = elapsed >= 1 / setting[start][1] - 1e-9 or k - start >= longest_phases
         if k == n or changed or full:
             pieces.append(timeline.part(slice(start, k)))
             start, elapsed = k, 0.0

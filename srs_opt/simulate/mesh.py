@@ -57,25 +57,44 @@ class Mesh:
         NoAnswerError
             If that takes more steps than any motion of a real robot does.
         """
+        return _divided(self.h_s, self.phase, _density(error, tolerance), 2)
+
+    @staticmethod
+    def graded(durations: np.ndarray, h_s: np.ndarray, error: np.ndarray, tolerance: float) -> Mesh:
+        """Divide phases of `durations` by the errors that other steps `h_s` over the same time have made.
+
+        The phases may be others than those of the steps: what is known is where steps have to be short.
+        """
         density = _density(error, tolerance)
-        phases, first = np.unique(self.phase, return_index=True)
-        totals = np.add.reduceat(density, first)
-        counts = np.maximum(np.ceil(totals).astype(int), 2)
-        span_s = float(self.h_s.sum())
-        if counts.sum() > max(MOST_STEPS_PER_S * span_s, MOST_STEPS_AT_ALL):
-            raise NoAnswerError(
-                f"the motion cannot be integrated: {span_s:.3g} s of it would take {counts.sum()} steps; "
-                "parameters are far from those of any robot"
-            )
-        # the running count of new steps, made whole at every phase's end
-        level = np.concatenate(
-            [[0.0], np.cumsum(density * np.repeat(counts / totals, np.diff([*first, error.size])))]
+        times, edges = np.cumsum([0.0, *h_s]), np.cumsum([0.0, *durations])
+        nodes = np.unique([*np.minimum(times, edges[-1]), *edges])
+        middles = (nodes[:-1] + nodes[1:]) / 2
+        step = np.searchsorted(times, middles).clip(1, h_s.size) - 1
+        phase = np.searchsorted(edges, middles).clip(1, durations.size) - 1
+        parts = np.diff(nodes)
+        return _divided(parts, phase, density[step] * parts / h_s[step], 1)
+
+
+def _divided(h_s: np.ndarray, phase: np.ndarray, density: np.ndarray, least: int) -> Mesh:
+    """Return a mesh with `density` (n,) new steps in place of each old one, at least so many per phase."""
+    phases, first = np.unique(phase, return_index=True)
+    totals = np.add.reduceat(density, first)
+    counts = np.maximum(np.ceil(totals).astype(int), least)
+    span_s = float(h_s.sum())
+    if counts.sum() > max(MOST_STEPS_PER_S * span_s, MOST_STEPS_AT_ALL):
+        raise NoAnswerError(
+            f"the motion cannot be integrated: {span_s:.3g} s of it would take {counts.sum()} steps; "
+            "parameters are far from those of any robot"
         )
-        times = np.concatenate([[0.0], np.cumsum(self.h_s)])
-        nodes = np.interp(np.arange(counts.sum() + 1), level, times)
-        edges = np.concatenate([[0], np.cumsum(counts)])
-        nodes[edges] = times[[*first, error.size]]
-        return Mesh(np.diff(nodes), np.repeat(phases, counts))
+    # the running count of new steps, made whole at every phase's end
+    level = np.concatenate(
+        [[0.0], np.cumsum(density * np.repeat(counts / totals, np.diff([*first, density.size])))]
+    )
+    times = np.concatenate([[0.0], np.cumsum(h_s)])
+    nodes = np.interp(np.arange(counts.sum() + 1), level, times)
+    edges = np.concatenate([[0], np.cumsum(counts)])
+    nodes[edges] = times[[*first, density.size]]
+    return Mesh(np.diff(nodes), np.repeat(phases, counts))
 
 
 def _density(error: np.ndarray, tolerance: float) -> np.ndarray:

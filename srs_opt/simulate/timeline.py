@@ -37,6 +37,8 @@ class Timeline:
     def of_gait(gait: Gait, duration_s: float) -> Timeline:
         """Play `gait` from its time 0 for `duration_s`."""
         durations, valves = gait.phases()
+        if duration_s == gait.period_s:
+            return Timeline.constant(durations, valves, gait.pressure_kpa, gait.frequency_hz)
         cycles = int(np.ceil(duration_s / gait.period_s - 1e-9))
         duration, valve = np.tile(durations, cycles), np.tile(valves, cycles)
         return Timeline.constant(duration, valve, gait.pressure_kpa, gait.frequency_hz).until(duration_s)

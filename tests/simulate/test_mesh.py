@@ -18,6 +18,19 @@ def test_a_refined_mesh_keeps_every_phase_s_length():
     assert finer.h_s.min() > 0.0
 
 
+def test_errors_of_other_steps_tell_where_steps_have_to_be_short():
+    h_s, error = np.full(100, 0.01), np.full(100, 1e-6)
+    error[40:60] = 81e-6  # local errors go with the fourth power of the step: three times as many steps here
+    mesh = Mesh.graded(np.array([0.1, 0.305, 0.0005, 0.5945]), h_s, error, 1e-6)
+    lengths = np.bincount(mesh.phase, weights=mesh.h_s)
+    assert lengths == pytest.approx([0.1, 0.305, 0.0005, 0.5945], rel=1e-9)
+    begins_s = np.cumsum(mesh.h_s) - mesh.h_s
+    hard = (begins_s > 0.42) & (begins_s < 0.58)
+    easy = (begins_s < 0.35) | (begins_s > 0.65)
+    assert mesh.h_s[hard] == pytest.approx(0.01 / 3, rel=0.05)
+    assert mesh.h_s[easy] == pytest.approx(0.01, rel=0.05)
+
+
 def test_a_motion_beyond_any_robot_s_is_refused_before_memory_is_full():
     """A fit's wild trial asked for 21 million steps and 11 GB once."""
     span_s = 10.0
