@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
@@ -38,7 +39,10 @@ FIELD = 0.0212  # body lengths between the nodes of the distance field, where th
 # Body lengths (10 mm): plans keep this much room at most for a stiffness's deviation. What a cycle may be off
 # would close most mazes where a stiffness is known within a factor; the driver sees and learns every cycle.
 MOST_DEVIATION = 0.0424
-STEP_S = 0.002  # errs by about 0.04 mrad per cycle
+# Integration step of searches: a cycle's heading errs by 0.2 to 0.3 mrad (root mean square), with half of the
+# step by 0.05. Errors add up: ways that take longer than LONG_S get shorter steps, at least SHORTEST of it;
+# else certificates refuse plans of a hundred cycles again and again.
+STEP_S, LONG_S, SHORTEST = 0.002, 30.0, 1 / 3
 
 
 @dataclass(frozen=True)
@@ -184,11 +188,17 @@ class Problem:
     def _cycles(self) -> dict[tuple[int, int], CycleRun]:
         return {}
 
+    @cached_property
+    def _step_s(self) -> float:
+        """Return the step of searches, shorter the longer the way is."""
+        way_s = float(self.to_goal.at(np.array([self.start.x, self.start.y])))
+        return STEP_S * max(math.sqrt(LONG_S / max(way_s, LONG_S)), SHORTEST)
+
     def _cycle(self, before: int, gait: int) -> CycleRun:
         """Return the cycle of a gait after another, made when it is first asked for."""
         key = (gait, gait) if self.joints.is_plain(before, gait) else (before, gait)
         if key not in self._cycles:
-            self._cycles[key] = CycleRun(self.integrator, self.joints.timeline(*key), STEP_S)
+            self._cycles[key] = CycleRun(self.integrator, self.joints.timeline(*key), self._step_s)
         return self._cycles[key]
 
     def as_planned(self, state: Array, run: Integrator | None = None) -> Array:
