@@ -136,7 +136,9 @@ def section(rows: list[Row], when: str) -> Section:
         for row in rows
     ]
     columns = ["task", "seed", "time, s", "certificate", "table gaits, s", "shorter by", "processor time, s"]
-    return Section("Manoeuvres against sequences of table gaits", columns, cells, [f"Measured {when}."])
+    notes = [f"Measured {when}."]
+    notes += [f"{row['task']}: {row['effort']} only." for row in rows if "effort" in row]
+    return Section("Manoeuvres against sequences of table gaits", columns, cells, notes)
 
 
 def run(quick: bool) -> Section:
