@@ -166,10 +166,10 @@ def run_command(
             print(json.dumps({"error": one_line(error)}))
         return 1
     except KeyboardInterrupt:
-        print(f"\n{parser.prog}: interrupted; nothing half-written was left behind", file=sys.stderr)
+        print(f"\n{parser.prog}: interrupted; no incomplete file was left behind", file=sys.stderr)
         return 130
     except Terminated:
-        print(f"{parser.prog}: terminated; nothing half-written was left behind", file=sys.stderr)
+        print(f"{parser.prog}: terminated; no incomplete file was left behind", file=sys.stderr)
         return 143
     except BrokenPipeError:
         _close_output()
@@ -180,8 +180,8 @@ def run_command(
         return 2
     except MemoryError as error:
         print(
-            f"{parser.prog}: not enough memory for what was asked ({one_line(error) or 'no detail'}); "
-            "ask for less: shorter, fewer or coarser",
+            f"{parser.prog}: out of memory ({one_line(error) or 'no detail'}); "
+            "ask for something shorter, smaller or coarser",
             file=sys.stderr,
         )
         return 2
@@ -192,8 +192,8 @@ def run_command(
             print(f"{parser.prog}: {_missing_package(error.name)}", file=sys.stderr)
             return 2
         print(
-            f"{parser.prog}: a fault of the program, {type(error).__name__}: {one_line(error)[:300]} "
-            "(SRS_OPT_TRACEBACK=1 shows where; please report it)",
+            f"{parser.prog}: internal error, {type(error).__name__}: {one_line(error)[:300]} "
+            "(please report it; SRS_OPT_TRACEBACK=1 shows where)",
             file=sys.stderr,
         )
         return FAULT

@@ -189,7 +189,7 @@ def _inside(t: float, on: float, off: float) -> bool:
 def _check_intervals(segment: int, intervals: tuple[Interval, ...], period_s: float) -> None:
     where = f"gait: segment {segment}"
     if not intervals:
-        raise InputError(f"{where}: no on-interval; a valve that never switches bends the robot for good")
+        raise InputError(f"{where}: no on-interval; a valve that never switches keeps its segment bent")
     for on, off in intervals:
         if not (0 <= on < period_s and 0 <= off < period_s):
             raise InputError(f"{where}: switch times must lie in [0, {period_s:g}) s, found {on:g}, {off:g}")

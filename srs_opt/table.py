@@ -122,7 +122,7 @@ def read_rows(file: str, required: Sequence[str], optional: Sequence[str], repor
             continue
         rows.append(Row(file, number, {name: cell.strip() for name, cell in zip(header, cells)}))
     if not rows:
-        report.error(file, None, "has a header and no rows")
+        report.error(file, None, "has a header but no rows")
     return rows
 
 
@@ -131,7 +131,7 @@ def _check_header(
 ) -> bool:
     known = [*required, *optional]
     for name in sorted({n for n in header if header.count(n) > 1}):
-        report.error(file, line, f"column '{name[:40]}' stands there twice")
+        report.error(file, line, f"column '{name[:40]}' appears twice")
     missing = [name for name in required if name not in header]
     for name in missing:
         hint = " (cells must be separated by commas)" if len(header) == 1 and ";" in header[0] else ""
@@ -218,7 +218,7 @@ def _faulty_numbers(file: str, report: Report) -> NumberTable | None:
     lines = _read_lines(file, report)
     if len(lines) < 2:
         if lines:
-            report.error(file, None, "has a header and no rows")
+            report.error(file, None, "has a header but no rows")
         return None
     header = tuple(name.strip() for name in lines[0][1])
     rows, numbers = [], []

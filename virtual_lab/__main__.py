@@ -240,7 +240,7 @@ def main(argv: list[str] | None = None) -> int:
         print(f"{PROG}: {error.filename or 'output'}: {error.strerror or error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        print(f"\n{PROG}: interrupted; nothing half-written was left behind", file=sys.stderr)
+        print(f"\n{PROG}: interrupted; no incomplete file was left behind", file=sys.stderr)
         return 130
     return 0
 

@@ -81,7 +81,7 @@ def in_own_process(call: Callable[..., T], *given: Any, what: str) -> T:
     try:
         return cast(T, receiver.recv())
     except EOFError:
-        raise NoAnswerError(f"{what}: a planner took its process down") from None
+        raise NoAnswerError(f"{what}: a planner crashed its process") from None
     finally:
         process.terminate()  # an orderly end would list what OMPL's bindings forget to free
         process.join()

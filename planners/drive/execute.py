@@ -166,7 +166,7 @@ class Drive:
                 return self._stop(reason)
             if self._at_goal():
                 return None
-            self.tell(f"cycle {len(self.played)}: halted, looking for a way from rest")
+            self.tell(f"cycle {len(self.played)}: halted, replanning from rest")
             return None if self._plan_anew() else self._stop(reason)
         outcome = self._cycle(gait)
         if outcome == "arrived" and not self.plant.waits:
@@ -193,7 +193,7 @@ class Drive:
         ) and self.replans < MOST_REPLANS:
             self.replans += 1
             why = "strayed or stuck" if lost else "nothing fits"
-            self.tell(f"cycle {len(self.played)}: {why}, planning anew")
+            self.tell(f"cycle {len(self.played)}: {why}, replanning")
             if not self.plant.waits and self.before != self.problem.motion.rest:
                 return None  # it cannot be planned in motion: halt first
             if self._plan_anew():

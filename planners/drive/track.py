@@ -204,7 +204,7 @@ def choose(
 
 
 def by_plan(problem: Problem, where: Where, learned: Learned, gait: int) -> Choice:
-    """Return a gait that is played because the plan says so; its clearance is somebody else's to look at."""
+    """Return a gait that is played because the plan says so; the caller checks its clearance."""
     local = learned.apply(
         problem.motion.move(0.0, 0.0, 0.0, where.gait, where.speed_m_s).pose, problem.motion.period_s
     )

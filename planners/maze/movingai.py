@@ -142,7 +142,7 @@ def map_of(scenario: Scenario, source: str) -> Path:
     folder = Path(source).parent
     named = scenario.map_name.replace("\\", "/")
     if "\0" in named:
-        raise InputError(f"{source}: the map's name holds a zero byte")
+        raise InputError(f"{source}: the map's name contains a null byte")
     candidates = [folder / named, folder / Path(named).name, Path(source).with_suffix("")]
     for candidate in candidates:
         if os.path.isfile(candidate):

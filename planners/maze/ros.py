@@ -84,7 +84,7 @@ def _image_path(document: Document, name: str) -> Path:
     """Return the image's path: beside the YAML file, absolute, from the home folder, or a file:// address."""
     place = ("image",)
     if "\0" in name:
-        raise document.error(place, "the file name holds a zero byte")
+        raise document.error(place, "the file name contains a null byte")
     if name.startswith("file:"):
         address = urlsplit(name)
         if address.netloc not in ("", "localhost"):

@@ -288,7 +288,7 @@ class PilotedPlant:
             self._camera.poll()
             self._look()
             if self._clock.now() - begun_s > 2.0:
-                raise NoAnswerError("no pose came within 2 s; check the camera's stream and --pose")
+                raise NoAnswerError("no pose received within 2 s; check the camera's stream and --pose")
         x, y, heading = np.median(self._straight(self._seen[-1].time_s - REST_S), axis=0)
         return self._problem.as_planned(self.run.rest(float(x), float(y), float(heading)))
 

@@ -103,7 +103,7 @@ def pilot(
     InputError
         If the controller holds another program, or the robot does not lie at the start.
     NoAnswerError
-        If the controller does not answer, no pose comes, or the drive fails on the model already.
+        If the controller does not answer, no pose comes, or the drive already fails in simulation.
     """
     line = connect(port, clock, program)
     # a rehearsal on the model: it also loads all code, so that the first real decision is not late
@@ -111,7 +111,7 @@ def pilot(
     rehearsal = execute(problem, plan)
     decision_s = 2 * (time.perf_counter() - begun_s) / max(len(rehearsal.gaits), 1)
     if not rehearsal.reached:
-        raise NoAnswerError(f"the drive fails on the model already: {rehearsal.reason}")
+        raise NoAnswerError(f"the drive already fails in simulation: {rehearsal.reason}")
     log = DriveLog()
     plant = PilotedPlant(problem, program, line, Camera(source), clock, log, tell, watch)
     plant.expect_decisions(min(decision_s, LONGEST_DECISION_S))
@@ -134,6 +134,6 @@ def _check_start(problem: Problem, state: np.ndarray) -> None:
     if off_m > AT_START * problem.robot.length_m or off_rad > AT_START_RAD:
         raise InputError(
             f"the robot lies at ({state[X]:.3f}, {state[Y]:.3f}), heading {state[HEADING]:.2f}; the start is "
-            f"({start.x:.3f}, {start.y:.3f}), {start.heading:.2f}: put it there, or plan from where it lies: "
+            f"({start.x:.3f}, {start.y:.3f}), {start.heading:.2f}: move it there, or plan from its position: "
             f"--start {state[X]:.3f},{state[Y]:.3f},{state[HEADING]:.2f}"
         )

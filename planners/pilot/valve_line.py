@@ -154,7 +154,7 @@ class ValveLine:
                 self._clock.sleep(0.001)
         raise NoAnswerError(
             f"the valve controller does not answer ({kind.name.lower()} sent {MOST_TRIES} times, "
-            f"{self._receiver.bad_frames} damaged frames came back); check port, baud rate and power"
+            f"{self._receiver.bad_frames} damaged frames received); check port, baud rate and power"
         )
 
     def _next_seq(self) -> int:

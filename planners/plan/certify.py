@@ -130,7 +130,7 @@ class Certifier:
     def _played(self, gaits: Sequence[int], levels: tuple[int, int]) -> list[list[Trajectory]]:
         """Return the trajectories of all cycles, integrated with two levels' tolerances.
 
-        What comes after a cycle that runs into a wall for certain is nobody's plan: it is left out.
+        Cycles after one that certainly runs into a wall are left out.
         """
         coarse, fine = (self._known[level] for level in levels)
         coarse.keep(gaits)

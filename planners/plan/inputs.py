@@ -190,7 +190,7 @@ def gaits_for(
     from srs_opt.gait_opt.catalogue import default_table
 
     if unsteady := room_effects(robot):
-        tell(f"note: planned without {', '.join(unsteady)}: what depends on the room has no gait")
+        tell(f"note: planned without {', '.join(unsteady)}: they depend on the place, no gait is steady")
     if not robot.is_soft:
         tell(
             f"note: robot '{robot.name}' gives no bending stiffness: rigid actuators assumed; a body that "

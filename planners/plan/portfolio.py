@@ -93,9 +93,9 @@ def _rounds(problem: Problem, request: PlanRequest, tell: Tell) -> PlanResult:
             return result
         if not has_ompl():
             if not turn:
-                tell(f"{MISSING}: our own searches go on alone")
+                tell(f"{MISSING}: continuing with the built-in searches")
             continue
-        tell(f"lattice: nothing among {ours[0].looked_at} cycles; OMPL's planners look too")
+        tell(f"lattice: nothing among {ours[0].looked_at} cycles; trying OMPL's planners as well")
         plan = _ompl_round(problem, request, FIRST_ITERATIONS * 2**turn, left)
         if plan is not None:
             return PlanResult("solved", plan, None, 0.0, result.effort)
@@ -120,7 +120,7 @@ def _ompl_round(problem: Problem, request: PlanRequest, iterations: int, left_s:
 
 
 def _result(future: Future[tuple[int, ...] | None], left_s: float) -> tuple[int, ...] | None:
-    """Return what a planner found; nothing when it is late or took its process down."""
+    """Return what a planner found; nothing when it is late or crashed its process."""
     try:
         return future.result(max(0.1, left_s))
     except (TimeoutError, LateError, BrokenExecutor):

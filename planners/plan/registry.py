@@ -40,7 +40,7 @@ HALVINGS = 3  # of cells near walls, in the second lattice search
 # what `auto` asks, in this order; OMPL's only where our own searches have found nothing
 OURS = ("lattice", "fine")
 OMPLS = ("dubins-rrtconnect", "rs-rrtconnect", "kpiece1", "est", "rrt")
-UNUSABLE = ("aorrtc",)  # takes its process down
+UNUSABLE = ("aorrtc",)  # crashes its process
 
 
 class Effort(NamedTuple):
@@ -78,7 +78,7 @@ class Planner:
     apart: bool = False
 
     def find(self, problem: Problem, effort: Effort) -> tuple[int, ...] | None:
-        """Return the gaits of a way to the goal, or None; nobody has certified them."""
+        """Return the gaits of a way to the goal, or None; they are not certified yet."""
         if self.make is not None:
             return run_planner(problem, self.make, effort.iterations, effort.seed)
         assert self.search is not None  # one of the two is there
@@ -115,7 +115,7 @@ def _ours(solver: Callable[..., LatticeSolver], problem: Problem, effort: Effort
 
 
 def _fine(problem: Problem, **options: Any) -> LatticeSolver:
-    """Return the search that tells places near walls apart more finely: slower, but it threads needles."""
+    """Return the lattice search with finer cells near walls: slower, for gaps that the first one misses."""
     settings = LatticeSettings(most_halvings=HALVINGS, by_heading=True, slack=LEAST_SLACK)
     return LatticeSolver(problem, settings, beams=(), **options)
 

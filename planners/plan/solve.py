@@ -148,7 +148,7 @@ class LatticeSolver:
             if self.beams:
                 self.beams = self.beams[1:]
                 self.tell(
-                    "the beam died; looking " + ("finer" if self.beams else "at everything within reach")
+                    "no plan in this beam; searching " + ("a finer one" if self.beams else "exhaustively")
                 )
             elif self.refined:
                 return False
@@ -163,13 +163,13 @@ class LatticeSolver:
                     slack=LEAST_SLACK,
                     by_heading=True,
                 )
-                self.tell("nothing left at this resolution; looking again at half of it")
+                self.tell("search exhausted at this resolution; searching again at half of it")
         self._begin_again((), self.begin)
         return True
 
     def _mend(self, gaits: tuple[int, ...], certificate: Certificate) -> None:
         """Begin again some cycles before the failure, with a little more clearance."""
-        self.tell(f"certificate refused: {certificate.reason}; mending the plan from there")
+        self.tell(f"certificate failed: {certificate.reason}; repairing the plan from there")
         assert certificate.failed_cycle is not None  # it has failed
         keep = max(0, certificate.failed_cycle - BACK * self.counts["certificates"])
         here = self.begin

@@ -115,7 +115,7 @@ def refine(problem: Problem, plan: Plan, tell: Tell = lambda message: None) -> R
         numbers = tuple(problem.motion.rest + 1 + k for k in range(len(own)))
         certificate = certify(known, numbers)
         if not certificate.passed:
-            reason = f"certificate refused: {certificate.reason}"
+            reason = f"certificate failed: {certificate.reason}"
             tell(f"refined plan: {reason}")
             continue
         better = Plan(plan.planner, numbers, certificate)
@@ -201,7 +201,7 @@ class _Refiner:
         # what is not kept yet is put right by the next window; its dwell begins with what is kept
         _, spare = solver.order_rows(window.first(cycles), 0)
         if spare.min() < -1e-9:
-            raise NoAnswerError("valves could not play the refined cycles on their ticks")
+            raise NoAnswerError("the refined cycles cannot be quantized to the valves' ticks")
         return window
 
     def _played(self, joint: Joint, state: Array) -> Array:

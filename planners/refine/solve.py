@@ -94,7 +94,7 @@ class WindowSolver:
         """
         (best,) = self.judge([window])
         if best is None:
-            raise NoAnswerError("the model cannot go through the plan")
+            raise NoAnswerError("the plan cannot be simulated")
         reach, idle = REACH_S, 0
         for _ in range(most):
             if reach < LEAST_REACH_S or idle > MOST_IDLE:

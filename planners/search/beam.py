@@ -20,10 +20,10 @@ from planners.search.problem import Cycle, Problem
 from planners.search.tree import Root, Step, Tree, arrival_index, at_rest, cell_of
 from srs_opt.model.state import FORWARD, HEADING, PLACE, X, Y
 
-TOGETHER = 8  # cycles simulated in one go
+TOGETHER = 8  # cycles simulated in one batch
 FIRST_LOOK = 32  # gaits whose bodies are looked at first, most promising first
 NARROW, WIDE, WIDTH_TIMES_S = 12, 32, 200.0  # widths of beams, and width times seconds to go
-DOUBTFUL, STALLED = 3, 10  # cycles without coming nearer to the goal: in doubt, given up
+DOUBTFUL, STALLED = 3, 10  # cycles without progress towards the goal: doubted, given up
 
 
 @dataclass(frozen=True)
@@ -33,11 +33,11 @@ class BeamSettings:
     Attributes
     ----------
     width : int, optional
-        States that go on; without, few on a long way and more on a short one.
+        States kept per level; by default few on a long way and more on a short one.
     branching : int
-        Of one state, so many at most.
+        Most successors kept of one state.
     cell, course_rad, speed : float
-        Cells by which states are told apart: of two in a cell the cheaper goes on.
+        Cells of the duplicate test: of two states in one cell the cheaper is kept.
     change_s : float
         Cost of changing gait.
     air_s : float
@@ -69,7 +69,7 @@ class _Expansion(NamedTuple):
 
 
 class BeamSearch:
-    """A beam that is driven on until it arrives or dies."""
+    """A beam search, advanced until it arrives or has no state left."""
 
     def __init__(
         self, problem: Problem, settings: BeamSettings | None = None, root: Root | None = None
@@ -98,7 +98,7 @@ class BeamSearch:
         return self._stalled >= DOUBTFUL
 
     def advance(self, expansions: int) -> list[Step] | None:
-        """Drive the beam on over about `expansions` states; return the way to the goal when it has ended."""
+        """Advance the beam by about `expansions` states; return the way to the goal when it has ended."""
         last = self.expanded + expansions
         while self._front and self.expanded < last:
             ranked = sorted(e for node in self._front for e in self._expansions(node))

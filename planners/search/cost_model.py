@@ -19,11 +19,13 @@ from srs_opt.robot import Robot
 Array = NDArray[np.float64]
 Cost = Literal["time", "length", "clearance", "air"]
 COSTS: tuple[Cost, ...] = get_args(Cost)
-TIME_COUNTS = 0.3  # of a second per second where time is not the cost: dawdling is never free
-NEAR_WIDTHS, NEAR_FACTOR = 2.0, 3.0  # within so many body widths of air, up to so much dearer
-DEARER = 1.3  # than the cheapest gait, straight and steady, is a metre of way as a rule
-START_UP_S = 0.6  # that a start from rest costs more than a flying one
-SLOW = 0.1  # of the top speed; slower gaits say nothing of what a metre costs
+TIME_COUNTS = (
+    0.3  # of a second per second where time is not the cost: else the slowest plan would cost no more
+)
+NEAR_WIDTHS, NEAR_FACTOR = 2.0, 3.0  # within so many body widths of a wall, up to so many times more
+TYPICAL_OVER_LEAST = 1.3  # cost of a typical metre over one with the cheapest gait, straight and steady
+START_UP_S = 0.6  # extra cost of a start from rest
+SLOW = 0.1  # of the top speed; slower gaits are left out of the cost of a metre
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +58,7 @@ class CostModel:
 
     @property
     def start_up(self) -> float:
-        """Return what a start from rest costs more than a flying one; more of its air."""
+        """Return the extra cost of a start from rest (of air, more)."""
         return {"length": TIME_COUNTS, "air": 1.5}.get(self.cost, START_UP_S)
 
     @property
@@ -101,10 +103,10 @@ class CostModel:
             return np.full(in_time.shape, 1 / self.top_speed_m_s) + TIME_COUNTS * in_time
         moving = self.speed_m_s > SLOW * self.top_speed_m_s
         least = (self.air_j[moving] / (self.speed_m_s[moving] * self.period_s[moving])).min()
-        return DEARER * least / self._air_w + TIME_COUNTS * in_time
+        return TYPICAL_OVER_LEAST * least / self._air_w + TIME_COUNTS * in_time
 
     def _nearness(self, spare_m: Array) -> Array:
-        """Return the factor by which nearness to walls makes dearer."""
+        """Return the factor on the cost near walls."""
         return 1 + NEAR_FACTOR * np.clip(1 - spare_m / (NEAR_WIDTHS * self.body_width_m), 0.0, 1.0)
 
 

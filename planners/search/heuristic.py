@@ -1,4 +1,4 @@
-"""What is still to come: the estimated cost from where a cycle ends to the goal."""
+"""The search's heuristic: the estimated cost to go from the end of a cycle to the goal."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from planners.search.costmap import BLOCKED_S
 from planners.search.problem import Problem
 
 Array = NDArray[np.float64]
-MOST_GAIN = 5.0  # times the fastest gait's time for it, is the cost of a way along the body
-OFF_THE_WAY_S = 1.0  # for a head in a place that leads nowhere
+MOST_GAIN = 5.0  # a point of the body may promise at most so many times the time of the way to it
+OFF_THE_WAY_S = 1.0  # added where the head is in a dead end
 
 
 def cost_to_go(problem: Problem, end: Array, speed_m_s: Array, by_heading: bool = False) -> Array:
@@ -24,7 +24,7 @@ def cost_to_go(problem: Problem, end: Array, speed_m_s: Array, by_heading: bool 
         Poses; the cost is the mean of the ways from the middle, from half-way to the head and, twice, from
         the head: it is the first to know that a cycle turns the right way.
     speed_m_s : array (gaits,)
-        Forward speeds there: speed is dear, it takes seconds to gather.
+        Forward speeds there. Accelerating takes several cycles, so slow states get a start-up cost.
     by_heading : bool
         Estimate by place, course and direction of travel (`heading_map`) instead of by place alone.
     """
@@ -54,7 +54,7 @@ def _by_place(problem: Problem, end: Array) -> tuple[Array, Array]:
     middle, head, front = problem.to_goal.at(np.stack([where, where + along, where + 0.5 * along]))
     head = np.where(head < BLOCKED_S, head, middle + OFF_THE_WAY_S)
     front = np.where(front < BLOCKED_S, front, middle + 0.5 * OFF_THE_WAY_S)
-    # what is nearer to the goal by more than the way there takes lies behind a wall
+    # a point that is nearer to the goal by more than the way to it takes lies behind a wall
     gain = MOST_GAIN * lever / problem.cost_model.top_speed_m_s
     head, front = np.maximum(head, middle - gain), np.maximum(front, middle - 0.5 * gain)
     return (middle + 2 * head + front) / 4, middle

@@ -220,13 +220,13 @@ class Problem:
         """Return one cycle of a gait from a state of the model, after a cycle of another (or rest)."""
         (cycle,) = self.simulate_all([(state, before, gait)])
         if cycle is None:
-            raise NoAnswerError(f"the model cannot go on with gait '{self.gaits.gaits[gait].name}'")
+            raise NoAnswerError(f"the simulation cannot continue with gait '{self.gaits.gaits[gait].name}'")
         return cycle
 
     def simulate_all(self, begins: Sequence[tuple[Array, int, int]]) -> list[Cycle | None]:
         """Return one cycle each from several states, gaits before and gaits, simulated side by side.
 
-        The company makes no difference to a cycle; None stands for one that the model cannot go through.
+        Each result is independent of the others; None stands for a cycle that cannot be simulated.
         """
         found = run_batched([self._cycle(before, gait)(state) for state, before, gait in begins])
         went = [

@@ -104,9 +104,9 @@ def _mended(dataset: DataSet, tell: Callable[[str], None]) -> DataSet:
     """Return the data set without outliers and with labels in order."""
     found = mended(dataset)
     if found.outliers:
-        tell(f"{sum(found.outliers.values())} positions left out that lie far from those before and after")
+        tell(f"{sum(found.outliers.values())} positions left out as outliers")
     if found.swapped:
-        tell(f"labels put right in trials {', '.join(found.swapped)}")
+        tell(f"swapped labels corrected in trials {', '.join(found.swapped)}")
     return found.dataset
 
 

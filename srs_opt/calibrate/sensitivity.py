@@ -1,4 +1,4 @@
-"""Derivatives of a trial's motion by any coordinates: its own steps once more, one coordinate a hair off.
+"""Derivatives of a trial's motion: its steps repeated on the same mesh with one coordinate perturbed.
 
 On a mesh that is kept the integration is a smooth function of the parameters, so that differences are exact
 as the integration sees them; and the compiled steps take several coordinates at once, for a fifth of what

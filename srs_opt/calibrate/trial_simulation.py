@@ -151,7 +151,7 @@ class TrialRun:
         Raises
         ------
         NoAnswerError
-            If the motion stops being finite.
+            If the motion becomes non-finite.
         """
         return run_one(self.search(values, tolerance_m_s))
 
@@ -233,7 +233,7 @@ def _fitted(
 
 def _check(got: StepResult) -> None:
     if not np.isfinite(got.states[:, -1]).all():
-        raise NoAnswerError("the simulated motion of a trial stops being finite; effect sizes out of range")
+        raise NoAnswerError("the simulated motion of a trial becomes non-finite; effect sizes out of range")
 
 
 def _cycles(timeline: Timeline, period_s: float) -> list[Timeline]:

@@ -12,7 +12,7 @@ from srs_opt.discrepancy.hypothesis import Hypothesis
 from srs_opt.discrepancy.screen import Linearisation, Score
 
 ADEQUATE = 0.01  # level at which a fitted model is rejected
-# Friction's smoothing is numerical, and its shape is nobody's physics: long data see the difference. What is
+# The smoothing of friction is numerical, not physical, and long data sets resolve the difference. What is
 # left of a gap is put down to it while it is this share of the noise's variance and of the gap's, and asks
 # for nothing known at a size that matters: gaits near a change of theirs show a thousandth of a wheel's toe.
 OF_NOISE, OF_GAP = 0.02, 0.01

@@ -103,7 +103,7 @@ def payoff(
             after,
         )
     except NoAnswerError as error:
-        tell(f"what the name changes is not shown: {error}")
+        tell(f"the effect on optimization and planning is not shown: {error}")
         return None
 
 

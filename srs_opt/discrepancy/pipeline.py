@@ -177,7 +177,7 @@ def diagnose(
     split = split_trials(dataset.trials)
     noise = noise_of(replace(dataset, trials=split.open))
     if not split.enough:
-        tell("looking for what to record")
+        tell("choosing what to record")
         following = first_experiment(dataset, noise, model)
         return _not_testable(dataset, split, noise.white_sd_m, started, following=following)
     quick = few_and_brief(split.open)
@@ -238,7 +238,7 @@ def _examine(
     if verdict.word == NO_GAP:
         seen = visible(experiment, null, search.candidates, sealed, settings)
     else:
-        tell("looking for the next experiment")
+        tell("choosing the next experiment")
         if verdict.word == DESCRIBED and description is not None:
             following = confirmation(description, first, split.open)
         else:

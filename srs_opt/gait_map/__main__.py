@@ -45,7 +45,8 @@ def run(options: argparse.Namespace) -> Answer:
     left_out = room_effects(robot)
     if left_out:
         say(
-            options, f"note: {', '.join(left_out)} know the room and have no steady gait; left out of the map"
+            options,
+            f"note: {', '.join(left_out)} left out of the map: they depend on the place, no gait is steady",
         )
     lags = options.phase_lag or [2 * math.pi / robot.segments]
     points = grid_points(_span("--frequency", options.frequency), _span("--pressure", options.pressure),

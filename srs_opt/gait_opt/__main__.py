@@ -247,7 +247,8 @@ def run(options: argparse.Namespace) -> Answer:
     for robot in problem.robots:
         if effects := room_effects(robot):
             say(
-                options, f"note: optimized without {', '.join(effects)}: what depends on the room has no gait"
+                options,
+                f"note: optimized without {', '.join(effects)}: they depend on the place, no gait is steady",
             )
     warm = load_gait(options.warm, problem.limits.pressure_kpa[1]) if options.warm else None
     begun, compiled_before = time.perf_counter(), compiled.compile_seconds

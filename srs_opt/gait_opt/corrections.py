@@ -28,7 +28,7 @@ def duty_biased(gait: Gait, cycles: float) -> Gait:
     ]
     room = min(gaps) / period - cycles  # several intervals of a segment must not meet
     if shortest + cycles < _LEAST_SHARE or longest + cycles > 1 - _LEAST_SHARE or room <= 0:
-        raise NoAnswerError("valves would hardly switch any more")
+        raise NoAnswerError("the duty bias is too large: valves would hardly switch")
     pairs = tuple(
         tuple(((on - change) % period, (off + change) % period) for on, off in pairs)
         for pairs in gait.intervals

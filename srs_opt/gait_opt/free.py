@@ -182,7 +182,7 @@ def _refined(problem: CycleProblem, gait: Gait, wave: Found, say: Callable[[str]
         top = run_stages(problem, gait, stages)
         exact, certificate, orbits = polished(problem, top.gait, 0.01)
     except NoAnswerError as error:
-        say(f"a rounded gait leads nowhere: {error}")
+        say(f"a rounded gait was dropped: {error}")
         return None
     say(
         f"{problem.intervals} intervals per segment: {certificate.speed_m_s:.4f} m/s with "

@@ -62,7 +62,7 @@ class Goal:
             raise InputError(f"objective {aim.name} needs a wanted speed: --speed M_S")
         if not aim.least_speed and self.speed_m_s is not None:
             raise InputError(
-                f"--speed has no meaning for objective {aim.name}, which takes all that it gets; ask for "
+                f"--speed has no meaning for objective {aim.name}, which maximizes it; ask for "
                 "slim, transport or turn at that speed, or give a --least-speed"
             )
         if self.radius_m is not None and self.radius_m == 0:

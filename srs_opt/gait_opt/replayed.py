@@ -30,5 +30,5 @@ def replayed(robot: Robot, table: GaitTable, model: str | None = None, *, jobs: 
         and abs(orbit.speed_m_s) > SLOWEST_M_S
     )
     if not gaits:
-        raise NoAnswerError(f"robot '{robot.name}' makes no way with any gait of '{table.robot_name}'")
+        raise NoAnswerError(f"robot '{robot.name}' does not move with any gait of '{table.robot_name}'")
     return GaitTable(robot.name, robot.fingerprint(), model, gaits)

@@ -153,7 +153,7 @@ def search(
     begun = time.perf_counter()
     refuse_contradictions(problem)
     if warm is None and problem.goal.speed_m_s:
-        say("the fastest straight gait first: is the wanted speed within reach?")
+        say("optimizing the fastest straight gait first: is the wanted speed feasible?")
         _refuse_out_of_reach(problem, problem.goal.speed_m_s, starts, seed, say, where)
     own = max(r.friction_speed_m_s for r in problem.robots)
     if warm is None:
@@ -173,7 +173,7 @@ def search(
     if not continued:
         if interrupted:
             raise KeyboardInterrupt
-        raise NoAnswerError("no start leads to a steady gait inside the limits")
+        raise NoAnswerError("no start converged to a steady gait within the limits")
     if not interrupted:
         chosen = _distinct(continued)[:_CARRIED]
         carried, interrupted = _all(continuing, [(k, continued[k].gait) for k in chosen], upper, where)
@@ -191,12 +191,12 @@ def search(
     reached = continued[best].gait
     settled: FromRest | None = None
     if astray and not interrupted:
-        say("collocated orbits are not those reached from rest: a search by simulation from rest")
+        say("collocation found orbits that are not reached from rest: searching by simulation from rest")
         settled = search_from_rest(problem, reached, seed)
         reached, interrupted = settled.gait, settled.interrupted
     exact, certificate, orbits = polished(problem, reached, reach, _reporter(say, best, len(candidates)))
     if warm is not None and not certificate.passed and not interrupted:
-        say(f"the earlier gait leads to none that holds ({certificate.failures[0]}): the whole search")
+        say(f"no valid gait near the earlier one ({certificate.failures[0]}): running the whole search")
         return search(problem, starts, seed, say, where=where)
     return Found(
         orbits[0].gait,
@@ -230,10 +230,10 @@ def _evolved(
     """Return what populations of simulated gaits come to, and whether Ctrl-C ended them early."""
     totals = [c.score.total for c in continued.values()]
     if _rugged(problem):
-        say("this objective has many optima: populations of simulated gaits")
+        say("this objective has many local optima: searching with populations of simulated gaits")
     else:
         scatter = f"the starts scatter from {min(totals):.4f} to {max(totals):.4f}"
-        say(f"{scatter}: populations of simulated gaits go on")
+        say(f"{scatter}: continuing with populations of simulated gaits")
     found: list[Continuation] = []
     many = populations(
         problem, 2 * starts, seed, say, jobs=where.jobs, cluster=where.cluster, resume=where.resume
@@ -251,7 +251,7 @@ def _warmed(problem: CycleProblem, warm: Gait, say: Say) -> tuple[Gait, bool]:
     """Return an earlier result inside the limits, and whether it does what is wanted as it is."""
     goal = problem.goal
     if goal.turn == "side" and goal.sense * orbits_of(problem, warm)[0].turn_rate_rad_s < 0:
-        say(f"the earlier gait turns away from the {goal.side}: its mirror image is taken")
+        say(f"the earlier gait turns away from the {goal.side}: using its mirror image")
         warm = warm.mirrored()
     start = within(problem.limits, warm)
     if start == warm and score(problem, warm, orbits_of(problem, warm)).miss < _KEPT:

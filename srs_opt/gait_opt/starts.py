@@ -79,7 +79,7 @@ def best_start(problem: CycleProblem, gaits: Sequence[Gait]) -> Gait:
                 start = steered(start, turn_miss(problem), _AIM_RAD_S)
             found.append((score(problem, start, orbits_of(problem, start)).total, -k, start))
     if not found:
-        raise NoAnswerError("no gait that the search could start from comes to a steady motion")
+        raise NoAnswerError("no starting gait reaches a steady motion")
     return max(found)[-1]
 
 

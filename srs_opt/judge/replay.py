@@ -138,7 +138,7 @@ def load_motion(file: str) -> dict[str, Any]:
     if path.name == "plan.json":
         plan = read_json(path, "a plan (JSON of plan)").value
         if not isinstance(plan, dict) or plan.get("status") != "solved":
-            raise InputError(f"{file}: is no solved plan, so there is nothing to play")
+            raise InputError(f"{file}: not a solved plan, nothing to play")
         path = path.with_name("motion.json")
     document = read_json(path, "the motion of a plan (motion.json, which plan writes beside plan.json)")
     record = document.value

@@ -90,7 +90,7 @@ def _with_steps(dataset: DataSet, options: argparse.Namespace) -> tuple[DataSet,
 
     path = options.dataset / "bench" / "steps.csv"
     if path.exists():
-        raise InputError(f"{path}: is there already; move it away first")
+        raise InputError(f"{path}: already exists; move it away first")
     steps, notes = steps_of(dataset)
     for note in notes:
         say(options, f"warning: {note}")

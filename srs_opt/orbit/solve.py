@@ -174,7 +174,7 @@ def _accurate_period_map(
             mapped = yield from plain_period_map(cycle.run, x, mesh, cycle.valve, cycle.p)
         if not np.isfinite(mapped.states[:, -1]).all():
             raise cycle.no_answer(
-                "the motion stops being finite; check pressure, masses, time constants and effect sizes"
+                "the motion becomes non-finite; check pressure, masses, time constants and effect sizes"
             )
         if mapped.error_m_s.max() <= LOOSE * tolerance:
             break

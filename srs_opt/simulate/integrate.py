@@ -119,7 +119,7 @@ class Integrator:
         Raises
         ------
         NoAnswerError
-            If the state stops being finite.
+            If the state becomes non-finite.
         """
         return run_one(self.stepping(x, mesh, valve, p))
 
@@ -129,7 +129,7 @@ class Integrator:
         Raises
         ------
         NoAnswerError
-            If the state stops being finite.
+            If the state becomes non-finite.
         """
         return run_one(self.travel(timeline, x, tolerance))
 
@@ -229,7 +229,7 @@ class Integrator:
         if not np.isfinite(got.states[:, -1]).all():
             bad = int(np.argmax(~np.isfinite(got.states).all(axis=0)))
             raise NoAnswerError(
-                f"the simulated motion of robot '{self.robot.name}' stops being finite "
+                f"the simulated motion of robot '{self.robot.name}' becomes non-finite "
                 f"{mesh.h_s[:bad].sum():.3g} s into a cycle: "
                 "check pressure, masses, time constants and effect sizes"
             )

@@ -225,7 +225,7 @@ def test_a_motion_that_is_not_finite_is_an_answer_in_words():
     run = Integrator(wpi_srs())
     x = run.rest()
     x[3] = np.nan
-    with pytest.raises(NoAnswerError, match="stops being finite"):
+    with pytest.raises(NoAnswerError, match="becomes non-finite"):
         run.integrate(Timeline.vent(4, 0.1, 55.0), x)
 
 

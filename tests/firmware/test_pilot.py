@@ -122,7 +122,7 @@ def test_an_interrupt_vents(arena):
 def test_a_robot_that_lies_elsewhere_or_holds_other_gaits_is_not_started(arena):
     start = arena.problem.start
     session = virtual_pilot(arena, start=(start.x + 0.05, start.y, start.heading))
-    with pytest.raises(InputError, match="put it there, or plan from where it lies: --start"):
+    with pytest.raises(InputError, match="move it there, or plan from its position: --start"):
         session.run(lambda plant: None)
     table = arena.problem.gaits
     fewer = Program.of_table(

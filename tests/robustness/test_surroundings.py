@@ -90,7 +90,7 @@ def test_read_only_folder(arguments):
 
 
 def test_disk_full(tmp_path):
-    """Files may not grow beyond a kilobyte, like on a full disk: told in a line, nothing half-written."""
+    """Files may not grow beyond a kilobyte, like on a full disk: told in a line, no incomplete file."""
     line, options = command(SIMULATE, "--out", tmp_path, "--quiet")
 
     def small_files() -> None:
