@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from srs_opt.discrepancy.describe import Description
     from srs_opt.discrepancy.pipeline import Discrepancy
 
+WIDE = 8.0  # largest over smallest value from which on an axis is logarithmic
 AFTER, BEFORE = COLOURS[:2]
 
 
@@ -42,7 +43,7 @@ def gap_picture(found: Discrepancy) -> Picture | None:
         drawn,
         "The gap closes" if found.believed else "What the best explanation so far does to the gap",
         "A trial that no fit saw. Left: the body at its end, as measured and as predicted by both models "
-        "(thin: the way of the markers' mean). Right: root mean square distance per coordinate over a fifth "
+        "(thin: the way of one marker). Right: root mean square distance per coordinate over a fifth "
         "of a second.",
     )
 
@@ -74,7 +75,7 @@ def gap_figure(found: Discrepancy) -> Figure | None:
     room.set_xlabel("x (mm)")
     room.set_ylabel("y (mm)")
     course.axhline(1e3 * found.gap.noise_floor, color="k", lw=0.8, ls="--", label="noise floor")
-    _log(course)
+    _spread(course)
     course.set_xlabel("time (s)")
     course.set_ylabel("distance to the markers (mm)")
     course.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
@@ -83,9 +84,13 @@ def gap_figure(found: Discrepancy) -> Figure | None:
     return figure
 
 
-def _log(axis: Axes) -> None:
-    """Make the axis of values logarithmic, with plain numbers on it where there is room."""
+def _spread(axis: Axes) -> None:
+    """Make the axis of values logarithmic where they span much, with plain numbers where there is room."""
     from matplotlib.ticker import LogFormatter
+
+    low, high = axis.dataLim.intervaly
+    if not 0 < low * WIDE < high:
+        return
 
     class Plain(LogFormatter):
         def __call__(self, x: float, pos: int | None = None) -> str:
@@ -102,9 +107,13 @@ def _labels(found: Discrepancy) -> tuple[str, str]:
 
 
 def middle(points: np.ndarray) -> np.ndarray:
-    """Return the mean of the seen markers (T, 2); NaN where none was seen."""
-    seen = np.isfinite(points[..., :1]).sum(axis=1)
-    return np.asarray(np.nansum(points, axis=1) / np.where(seen > 0, seen, np.nan))
+    """Return the way (T, 2) of the marker that was seen most, of several the nearest to the body's middle.
+
+    The mean of the seen markers would jump whenever one is lost.
+    """
+    seen = np.isfinite(points[..., 0]).sum(axis=0)
+    away = np.abs(np.arange(seen.size) - (seen.size - 1) / 2)
+    return np.asarray(points[:, np.lexsort((away, -seen))[0]])
 
 
 def _figure(width: float, height: float) -> Figure:
@@ -203,6 +212,6 @@ def _trials(found: Discrepancy) -> Picture:
     axis.axhline(1, color="k", ls="--", lw=0.8)
     axis.set_xticks(place, names, rotation=60)
     axis.set_ylabel("misfit / noise variance")
-    _log(axis)
+    _spread(axis)
     axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
     return encoded(figure, "Every open trial", "1 is what noise alone leaves.")

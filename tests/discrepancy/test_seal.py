@@ -95,10 +95,12 @@ def test_one_sealed_trial_far_off_is_set_aside_and_three_are_not():
     assert not seal.odd_sealed(gap(a=1e-4, b=5e-4, c=2e-4))
 
 
-def test_frames_in_which_no_marker_was_seen_have_no_middle():
+def test_the_way_drawn_is_one_marker_s_and_does_not_jump_when_another_is_lost():
     points = steady(np.arange(3) / 10)
     points[1] = np.nan
     points[2, 0] = np.nan
     found = middle(points)
     assert np.isnan(found[1]).all()
-    np.testing.assert_allclose(found[2], points[2, 1:].mean(axis=0))
+    np.testing.assert_allclose(found[[0, 2]], points[[0, 2], 2])
+    points[0, 2] = np.nan  # now others were seen more often
+    np.testing.assert_allclose(middle(points)[2], points[2, 1])
