@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 from srs_opt.calibrate.candidates import Candidate, effect_spec, entry_sd
@@ -48,6 +48,9 @@ class Settings:
         named effect, because a term is a simple likeness of what is there.
     explained : float
         Share of the misfit that the best may leave and need not be exchanged.
+    told : float
+        Deviance, on all open trials, by which another explanation is told from one that leaves nothing
+        significant, however little it leaves itself: a few times what chance makes of look-alikes.
     """
 
     closes: float = 0.75
@@ -56,6 +59,7 @@ class Settings:
     exchanges: int = 3
     bench: float = 7.0
     explained: float = 0.02
+    told: float = 20.0
 
 
 DEFAULT = Settings()
@@ -164,15 +168,16 @@ def describe(
     sealed : sequence of Trial
     """
     tried = sorted(_fitted(search, null, settings), key=_left)
-    found = None
-    for h in _contenders(tried, settings):
-        whole = search.fit(h.candidates, h.fit.point)
-        if whole is not None and (found is None or _left(whole) < _left(found)):
-            found = whole
-    if found is None:
+    fitted = [search.fit(h.candidates, h.fit.point) for h in _contenders(tried, settings)]
+    whole = [h for h in fitted if h is not None]
+    if not whole:
         return None
+    found = min(whole, key=_left)
+    if found.fit.variance_inflation == 1:  # what is left is noise: the likelihood tells them apart
+        found = min((h for h in whole if h.fit.variance_inflation == 1), key=lambda h: h.deviance)
     gap = open_seal(search.experiment, null, found.fit, sealed, search.seed)
-    why_not = _doubt(found, gap, tried, null, listed, len(search.candidates), settings)
+    told = {h.label for h in [*whole, listed] if _told(found, h, settings)}
+    why_not = _doubt(found, gap, tried, null, listed, len(search.candidates), told, settings)
     return Description(found, gap, tuple(tried), why_not)
 
 
@@ -222,6 +227,11 @@ def _left(hypothesis: Hypothesis) -> float:
     return max(hypothesis.fit.misfit_ratio - 1, 1e-3)
 
 
+def _told(found: Hypothesis, other: Hypothesis, settings: Settings) -> bool:
+    """Whether all open trials tell another explanation from one that leaves them nothing but noise."""
+    return found.fit.variance_inflation == 1 and other.deviance - found.deviance > settings.told
+
+
 def _doubt(
     found: Hypothesis,
     gap: Gap | None,
@@ -229,21 +239,23 @@ def _doubt(
     null: Fit,
     listed: Hypothesis,
     family: int,
+    told: Collection[str],
     settings: Settings,
 ) -> str:
     """Return why a description is not believed; empty when nothing is against it."""
     if null.deviance - found.deviance < needed_gain(found.candidates[0], family):
         return "it gains no more than the best of as many terms does by chance"
     lead = 1.0 if listed.candidates and listed.implausible() else settings.lead
-    if _left(found) > lead * _left(listed):
+    if _left(found) > lead * _left(listed) and listed.label not in told:
         return "listed effects do about as well"
     if gap is None or gap.ratio is None or gap.ratio > 1 - settings.closes:
         closed = 0.0 if gap is None or gap.ratio is None else 1 - gap.ratio
         return f"it closes only {closed:.0%} of the gap on the sealed trials"
     rivals = [h for h in tried if _says(h) != _says(found)]
     own = next(h for h in tried if h.label == found.label)
-    if rivals and _left(own) > settings.lead * _left(rivals[0]):
-        return f"{rivals[0].label} does about as well"
+    near = [h for h in rivals if _left(own) > settings.lead * _left(h) and h.label not in told]
+    if near:
+        return f"{near[0].label} does about as well"
     name, off = max(found.fit.off_bench.items(), key=lambda item: abs(item[1]), default=("", 0.0))
     if abs(off) > settings.bench:
         return f"{name} would lie {abs(off):.1f} standard deviations from its bench value"

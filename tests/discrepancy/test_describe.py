@@ -107,3 +107,26 @@ def test_located_is_what_closes_the_gap_when_fitted():
     assert [p.where for p in said] == ["curvature to motion (ground), link 2", "camera"]
     assert said[0].score == pytest.approx(3900)
     assert not stages(null, [fitted(4.0, soaking)])
+
+
+def explaining(name, deviance, misfit=1.0):
+    candidate = Candidate(Form(generic_effects()[name]))
+    fit = SimpleNamespace(misfit_ratio=misfit, variance_inflation=1.0, off_bench={}, point=None)
+    return SimpleNamespace(candidates=(candidate,), label=candidate.label, deviance=deviance, fit=fit)
+
+
+@pytest.mark.parametrize(("behind", "why"), [(200.0, ""), (5.0, "does about as well")])
+def test_look_alikes_that_leave_only_noise_are_told_apart_by_all_trials(monkeypatch, behind, why):
+    """Load or friction across the wheels that changes with curvature: on the first seconds both fit."""
+    load = explaining("generic_load_curvature", 1000.0)
+    across = explaining("generic_across_curvature", 1000.0 + behind)
+    by_label = {h.label: h for h in (load, across)}
+    monkeypatch.setattr(describe, "_fitted", lambda *_: [across, load])
+    monkeypatch.setattr(describe, "open_seal", lambda *_: SimpleNamespace(ratio=0.01))
+    search = SimpleNamespace(
+        fit=lambda c, p: by_label[c[0].label], candidates=range(80), experiment=0, seed=0
+    )
+    null = SimpleNamespace(deviance=9000.0)
+    listed = SimpleNamespace(candidates=(), label="no effect", deviance=8000.0, fit=fitted(1.6).fit)
+    found = describe.describe(search, null, listed, ())
+    assert found.best is load and found.why_not.endswith(why) and bool(found.why_not) == bool(why)
