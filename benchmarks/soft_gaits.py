@@ -70,7 +70,8 @@ def run(quick: bool) -> Section:
     """Show the stored optima beside the other gaits, simulated now."""
     known = stored_rows("soft_gaits")
     assert known is not None
-    measured, stored = known
+    measured, rows_kept = known
+    stored = [row for row in rows_kept if "ei_n_m2" in row]
     best = {row["ei_n_m2"]: row for row in stored}
     rigid = Gait.of_record(best[None]["gait"])
     curves: dict[str, list[float | None]] = {n: [] for n in ("published", "rigid", "own", "robust")}
@@ -101,6 +102,7 @@ def run(quick: bool) -> Section:
     ]
     if quick:
         return Section("Gaits of soft bodies", columns, rows, notes, ratios)
+    notes += [_searched_robust(row) for row in rows_kept if "robust_over" in row]
     changed = "; ".join(_changed())
     notes.append(f"Robust gait, other parameters, m/s (times the published gait) at {over} N m²: {changed}.")
     pictures = [_speeds_picture(curves)]
@@ -122,6 +124,22 @@ def _searched(stored: list[dict[str, Any]]) -> str:
         )
         told.append(f"{name}: {row['seconds']:.0f} s, {'passed' if row['passed'] else 'FAILED'}{how}")
     return "Searches (wall time, certificate): " + "; ".join(told) + "."
+
+
+def _searched_robust(row: dict[str, Any]) -> str:
+    """Return what a search for one robust gait came to, and what that gait makes at other stiffnesses."""
+    gait = Gait.of_record(row["gait"])
+    found = ", ".join(
+        f"{own:.3f} ({own / published:.2f} times the published gait)"
+        for own, published in zip(row["speeds_m_s"], row["published_m_s"])
+    )
+    between = ", ".join(f"{speed(body(ei), gait):.3f} at {ei:g}" for ei in (0.003, 0.01))
+    over = " ".join(f"{ei:g}" for ei in row["robust_over"])
+    return (
+        f"A run of gait_opt --stiffness {over} --starts 1: {found} m/s, certificate "
+        f"{'passed' if row['passed'] else 'FAILED'}, {row['from_rest']['evaluations']} gaits from rest; "
+        f"{between} N m²."
+    )
 
 
 def _changed() -> list[str]:
