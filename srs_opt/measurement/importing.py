@@ -18,13 +18,13 @@ from srs_opt.measurement.find_chain import best_start, symmetric
 from srs_opt.measurement.frequency import far_frequency, seen_frequency
 from srs_opt.measurement.ground import ground_axes, to_ground, without_ghosts
 from srs_opt.measurement.labels import follow, take
+from srs_opt.measurement.noise import noise_sd
 from srs_opt.measurement.onset import (
     QUIET_FRAMES,
     Gait,
     Onset,
     find_onset,
     first_motion,
-    noise_sd,
     run_in_s,
 )
 from srs_opt.measurement.read import parse_schedule

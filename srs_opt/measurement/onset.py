@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from srs_opt.errors import NoAnswerError
 from srs_opt.measurement.chain import Chain, chain_of, marker_positions
+from srs_opt.measurement.noise import noise_sd
 from srs_opt.measurement.records import Array, Schedule
 from srs_opt.measurement.spots import Spots
 from srs_opt.measurement.steps import step_response
@@ -74,13 +75,6 @@ def first_curvatures(robot: Robot, gait: Gait, time_s: Array, slowness: float = 
             column = column + (state[k + 1] - state[k]) * step_response(time_s - fine[k], s, q)
         columns.append(column)
     return np.column_stack(columns) * robot.curvature_per_pressure_1_m_kpa * gait.pressure_kpa
-
-
-def noise_sd(points_m: Array) -> float:
-    """Return the noise of one coordinate from third differences (a smooth motion hardly has any)."""
-    third = np.diff(points_m.reshape(len(points_m), -1), n=3, axis=0)
-    third = third[np.isfinite(third)]
-    return float(np.median(np.abs(third)) / 0.6745 / np.sqrt(20)) if len(third) else 0.0
 
 
 def find_onset(

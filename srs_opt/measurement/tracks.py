@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from srs_opt.measurement.chain import Chain, chain_of
+from srs_opt.measurement.noise import FEWEST, noise_sd, third_differences
 from srs_opt.measurement.plausible import factor_of_thousand
 from srs_opt.measurement.records import TAIL_TO_HEAD, Array, Trial
 from srs_opt.problem import Report
@@ -245,16 +246,12 @@ def _check_speed(track: Track, robot: Robot, good_clock: bool, report: Report) -
 
 
 def _check_noise(track: Track, marker_sd_m: float, report: Report) -> None:
-    """Third differences of a smooth motion are noise alone (their variance is 20 times one sample's)."""
-    third = np.diff(track.points_m, n=3, axis=0)
-    third = third[np.isfinite(third)]
-    if len(third) < 100 or not marker_sd_m > 0:
+    """Compare the noise that the tracks show with the one that dataset.yaml states."""
+    if len(third_differences(track.points_m)) < FEWEST or not marker_sd_m > 0:
         return
-    ratio = float(np.median(np.abs(third)) / 0.6745 / math.sqrt(20)) / marker_sd_m
+    ratio = noise_sd(track.points_m) / marker_sd_m
     message = f"marker noise is {ratio:.2g} times camera.marker_sd_m ({marker_sd_m:g} m)"
     if ratio > 200 or 0 < ratio < 1 / 200:
         report.error(track.file, None, f"{message}: units?")
     elif ratio > 5 or 0 < ratio < 0.2:
-        report.warn(
-            track.file, None, f"marker noise is {ratio:.2g} times camera.marker_sd_m ({marker_sd_m:g} m)"
-        )
+        report.warn(track.file, None, message)
