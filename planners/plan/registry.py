@@ -153,11 +153,6 @@ def register_planner(name: str, search: Search | None = None, *, ompl: MakePlann
     return _known[name]
 
 
-def known_planners() -> tuple[str, ...]:
-    """Return the names of planners that need no OMPL: ours, then those of plugins."""
-    return tuple(_known)
-
-
 def planner_named(name: str) -> Planner:
     """Return the planner of a name: ours, a plugin's, or any of OMPL's.
 

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 CONDITION = {"lifted": COLOURS[0], "ground": COLOURS[1]}
 TRACK, FIT = COLOURS[1], COLOURS[0]
+TRACK_IN = 2.7  # width of a track's axes
+NARROWEST = 0.25  # of a track's axes, by the longer side: a straight track's scale stays legible
 
 
 @styled
@@ -54,8 +56,8 @@ def circle_figure(centre_track_m: Array, circle: Circle) -> Figure:
 
 
 @styled
-def shape_figure(shape: SmoothShape, level_sds: float = 1.645) -> Figure:
-    """Draw smoothed curvatures over time with their bands (90 % by default)."""
+def bends_figure(shape: SmoothShape, expected_1_m: Array | None = None, level_sds: float = 1.645) -> Figure:
+    """Draw smoothed curvatures over time with their bands (90 % by default), and expected ones (T, N-1)."""
     segments = shape.curvature_1_m.shape[1]
     figure, grid = new_figure(segments, 1, height_in=0.8 + 0.9 * segments, sharex=True, squeeze=False)
     rows = grid[:, 0]
@@ -63,9 +65,14 @@ def shape_figure(shape: SmoothShape, level_sds: float = 1.645) -> Figure:
         middle, sd = shape.curvature_1_m[:, number], shape.curvature_sd_1_m[:, number]
         low, high = middle - level_sds * sd, middle + level_sds * sd
         axes.fill_between(shape.time_s, low, high, alpha=0.3, linewidth=0)
-        axes.plot(shape.time_s, middle)
+        axes.plot(shape.time_s, middle, label="seen")
+        if expected_1_m is not None:
+            axes.plot(
+                shape.time_s, expected_1_m[:, number], color=COLOURS[1], linestyle="--", label="expected"
+            )
         axes.set(ylabel=f"segment {number + 1}\n(1/m)")
-    rows[0].set(title="curvature, smoothed")
+    if expected_1_m is not None:
+        rows[0].legend(loc="lower right", bbox_to_anchor=(1, 0.98), ncols=2, borderaxespad=0)
     rows[-1].set(xlabel="time (s)")
     return figure
 
@@ -73,7 +80,13 @@ def shape_figure(shape: SmoothShape, level_sds: float = 1.645) -> Figure:
 @styled
 def track_figure(trial: Trial, every_s: float = 0.5) -> Figure:
     """Draw a trial's markers and the robot's outline at intervals of `every_s`."""
-    figure, axes = new_figure(width_in=3.5, height_in=3.2)
+    points = trial.markers_m if trial.markers_m is not None else trial.centre_m
+    assert points is not None
+    flat = points.reshape(-1, 2)
+    low, high = np.nanmin(flat, axis=0), np.nanmax(flat, axis=0)
+    wide, tall = np.maximum(high - low, NARROWEST * np.max(high - low)) * 1.1
+    height_in = float(np.clip(TRACK_IN * tall / wide, 0, 2 * TRACK_IN)) + 0.8
+    figure, axes = new_figure(width_in=TRACK_IN + 0.8, height_in=height_in)
     if trial.markers_m is not None:
         for number in range(trial.markers_m.shape[1]):
             axes.plot(*trial.markers_m[:, number].T, linewidth=0.5, color="0.7")
@@ -84,5 +97,9 @@ def track_figure(trial: Trial, every_s: float = 0.5) -> Figure:
             axes.plot(*frame[-1], "o", color=TRACK, markersize=3)
     elif trial.centre_m is not None:
         axes.plot(*trial.centre_m.T, ".", markersize=2)
+    middle = (low + high) / 2
+    axes.set(
+        xlim=(middle[0] - wide / 2, middle[0] + wide / 2), ylim=(middle[1] - tall / 2, middle[1] + tall / 2)
+    )
     axes.set(xlabel="x (m)", ylabel="y (m)", aspect="equal", title=f"trial {trial.name} (dot: head)")
     return figure

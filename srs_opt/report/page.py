@@ -10,7 +10,7 @@ import numpy as np
 
 from srs_opt.figures import COLOURS, PAGE_IN, Picture, encoded, new_figure, styled
 from srs_opt.files import write_text
-from srs_opt.measurement.figures import track_figure
+from srs_opt.measurement.figures import bends_figure, track_figure
 from srs_opt.measurement.motion import Interval
 from srs_opt.measurement.records import DataSet
 from srs_opt.problem import Problem
@@ -61,6 +61,12 @@ def _interval(interval: Interval | None, scale: float = 1.0) -> str:
 def _pictures(seen: Seen) -> list[Picture]:
     track = track_figure(seen.trial)
     drawn = [encoded(track, "Track", "Markers, and the robot every half second; the dot is the last marker.")]
+    if seen.bends is not None:
+        bends = bends_figure(seen.bends.seen, seen.bends.expected_1_m)
+        words = "Curvatures of the first cycles from the markers, with 90 % bands"
+        if seen.bends.expected_1_m is not None:
+            words += ", and those that robot.yaml gives for these valve states"
+        drawn.append(encoded(bends, "Bends", f"{words}."))
     if max(seen.lost) > LEAST_LOST:
         drawn.append(encoded(_lost_figure(seen), "Lost markers", "Frames without a position, per marker."))
     return drawn

@@ -16,10 +16,30 @@ from srs_opt.calibrate.noise import noise_of
 from srs_opt.calibrate.rejection import rejection_reason
 from srs_opt.errors import InputError, NoAnswerError
 from srs_opt.measurement.motion import Motion, trial_motion
-from srs_opt.measurement.records import DataSet, Trial
+from srs_opt.measurement.onset import Gait, first_curvatures
+from srs_opt.measurement.records import Array, DataSet, Trial
 from srs_opt.measurement.shape import shape_from_markers
+from srs_opt.measurement.smooth import Intensity, SmoothShape, smooth_shape
 from srs_opt.problem import Problem
 from srs_opt.robot import Robot
+
+FEWEST_FRAMES = 10
+BENDS_CYCLES, BENDS_S = 3.0, 6.0  # what is drawn of the bends: more cycles can no longer be told apart
+
+
+@dataclass(frozen=True, eq=False)
+class Bends:
+    """Curvatures of a trial's first cycles with their deviations, and those that the robot file expects.
+
+    Attributes
+    ----------
+    seen : SmoothShape
+    expected_1_m : ndarray, shape (T, N-1), or None
+        Of the valves' wave from rest; None where the drive is a record.
+    """
+
+    seen: SmoothShape
+    expected_1_m: Array | None
 
 
 @dataclass(frozen=True)
@@ -37,6 +57,8 @@ class Seen:
         Root mean square per coordinate of what the fitted shapes, and the robot file's motion, leave.
     motion : Motion or None
         Steady motion; its own residual is what a periodic gait leaves.
+    bends : Bends or None
+        None without markers or without a gait.
     warnings : tuple of str
     """
 
@@ -46,6 +68,7 @@ class Seen:
     shape_m: float | None
     model_m: float | None
     motion: Motion | None
+    bends: Bends | None
     warnings: tuple[str, ...]
 
     def record(self) -> dict[str, Any]:
@@ -82,16 +105,43 @@ def look(
     simulated = [t for t in dataset.trials if not rejection_reason(t)]
     experiment = Experiment(Model(robot), simulated, noise_of(dataset))
     start = Point({c.name: 0.0 for c in fitted_coordinates(robot) if not c.effect})
-    found = []
+    found: list[Seen] = []
+    intensity = None
     for trial in dataset.trials:
         tell(f"trial {trial.name}")
         warnings = [p.message for p in problems if p.file.endswith(f"/{trial.name}.csv")]
-        found.append(_seen(dataset, robot, trial, experiment, start, warnings))
+        bends = _bends(dataset, robot, trial, intensity)
+        intensity = bends.seen.intensity if bends else intensity
+        found.append(_seen(dataset, robot, trial, experiment, start, bends, warnings))
     return tuple(found)
 
 
+def _bends(dataset: DataSet, robot: Robot, trial: Trial, intensity: Intensity | None) -> Bends | None:
+    """Return the bends of the first cycles, smoothed with `intensity` (found from this trial if None)."""
+    if trial.markers_m is None or trial.kind != "gait" or not trial.frequency_hz > 0:
+        return None
+    duration = min(max(BENDS_CYCLES / trial.frequency_hz, 1.0), BENDS_S)
+    first = trial.time_s < trial.time_s[0] + duration
+    time, points = trial.time_s[first], trial.markers_m[first]
+    if np.isnan(points).all() or len(time) < FEWEST_FRAMES:
+        return None
+    seen = smooth_shape(robot, time, points, dataset.marker_sd_m, intensity, trial.spots)
+    if trial.applied:
+        return Bends(seen, None)
+    gait = Gait(
+        trial.frequency_hz, trial.pressure_kpa, trial.offset, trial.phase_lag_rad, schedule=trial.schedule
+    )
+    return Bends(seen, first_curvatures(robot, gait, time))
+
+
 def _seen(
-    dataset: DataSet, robot: Robot, trial: Trial, experiment: Experiment, start: Point, warnings: list[str]
+    dataset: DataSet,
+    robot: Robot,
+    trial: Trial,
+    experiment: Experiment,
+    start: Point,
+    bends: Bends | None,
+    warnings: list[str],
 ) -> Seen:
     points = trial.markers_m if trial.markers_m is not None else trial.centre_m
     assert points is not None
@@ -125,6 +175,7 @@ def _seen(
         shape_m,
         model_m,
         motion,
+        bends,
         tuple(warnings),
     )
 

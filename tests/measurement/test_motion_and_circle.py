@@ -137,7 +137,7 @@ def test_no_circle():
 
 def test_pictures(tmp_path):
     from srs_opt.figures import save_figure
-    from srs_opt.measurement.figures import circle_figure, shape_figure, step_figure, track_figure
+    from srs_opt.measurement.figures import circle_figure, bends_figure, step_figure, track_figure
     from srs_opt.measurement.records import StepTest
     from srs_opt.measurement.smooth import Intensity, smooth_shape
     from srs_opt.measurement.steps import fit_step, step_response
@@ -151,7 +151,7 @@ def test_pictures(tmp_path):
         "track": track_figure(trial),
         "circle": circle_figure(path.centre_of_mass(), fit_circle(path.centre_of_mass())),
         "steps": step_figure([test], [fit_step(test)]),
-        "shape": shape_figure(shape),
+        "shape": bends_figure(shape),
     }
     for name, figure in figures.items():
         assert all(file.stat().st_size > 5000 for file in save_figure(figure, tmp_path / name))

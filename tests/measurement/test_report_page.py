@@ -32,7 +32,8 @@ def test_page_and_numbers(folder, tmp_path, capsys):
     speed = trial["motion"]["speed_m_s"]
     assert speed["value"] == pytest.approx(0.2, abs=0.005)
     page = (tmp_path / "out" / "report.html").read_text()
-    assert page.count("data:image/png;base64,") == 2
+    assert page.count("data:image/png;base64,") == 3
+    assert "Bends" in page and "90 % bands" in page
     assert "Lost markers" in page and f"{speed['value']:.4g}" in page
     assert not re.search(r'(src|href)="(?!data:|#)', page)
     for warning in trial["warnings"]:
