@@ -243,7 +243,9 @@ class Trials:
                     self._motions[name] = wanted[name], nodes
         return {n: known[n] for n in names}
 
-    def _seen(self, name: str, nodes: Nodes, request: Request) -> NormalEquations | np.ndarray:
+    def _seen(
+        self, name: str, nodes: Nodes, request: Request
+    ) -> NormalEquations | np.ndarray | NoAnswerError:
         track = self._tracks[name]
         assert track is not None
         if request.coordinates is None:
@@ -263,6 +265,9 @@ class Trials:
         new = prediction.slopes.reshape(residual.size, -1)
         known |= {c.name: new[:, k] for k, c in enumerate(missing)}
         slopes = np.stack([known[n] for n in names], axis=1)
+        if not (np.isfinite(prediction.points).all() and np.isfinite(slopes).all()):
+            # an integration on the edge of breaking down ends, and has no derivatives: no place for a fit
+            return NoAnswerError(f"trial {name}: the motion has no finite derivatives there")
         if self.keeps and not served:
             self._slopes[name][wide] = Slopes(here, names, slopes.astype(np.float32))
             self._new_slopes.add((name, wide))

@@ -1,5 +1,7 @@
 """Slopes of the predicted picture against differences of the prediction itself."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from srs_opt.calibrate.experiment import Experiment, Point
 from srs_opt.calibrate.fit import start_point
 from srs_opt.calibrate.model import Model
 from srs_opt.calibrate.trials import Request
+from srs_opt.errors import NoAnswerError
 from srs_opt.measurement.records import Trial
 from srs_opt.robot import wpi_srs
 
@@ -103,3 +106,23 @@ def test_slopes_of_the_same_place_serve_again_whoever_is_asked(setting, monkeypa
     monkeypatch.setattr("srs_opt.calibrate.observe.variation", None)  # not needed any more
     assert not work.answer(["t"], wider)["t"].stale
     assert work.answer(["t"], Request(there, wider.coordinates, stale=True))["t"].stale
+
+
+@pytest.mark.parametrize("where", ["points", "slopes"])
+def test_a_motion_without_finite_derivatives_is_no_place_for_a_fit(where, monkeypatch):
+    robot = wpi_srs()
+    base = base_coordinates(robot)
+    blank = np.zeros((60, robot.links, 2))
+    trial = Trial("t", 1.5, 48.0, 0.4, np.pi / 2, 0.7, 0.6, np.arange(60) / 100, markers_m=blank)
+    experiment = Experiment(Model(robot), [trial], 0.001)
+    whole = experiment.work._predicted
+
+    def broken(*arguments):
+        prediction = whole(*arguments)
+        spoilt = np.array(getattr(prediction, where))
+        spoilt[-1] = np.nan
+        return replace(prediction, **{where: spoilt})
+
+    monkeypatch.setattr(experiment.work, "_predicted", broken)
+    with pytest.raises(NoAnswerError, match="trial t: the motion has no finite derivatives"):
+        experiment.normal_equations(start_point(base), base)
