@@ -137,7 +137,7 @@ def test_no_circle():
 
 def test_pictures(tmp_path):
     from srs_opt.figures import save_figure
-    from srs_opt.measurement.figures import circle_figure, bends_figure, step_figure, track_figure
+    from srs_opt.measurement.figures import bends_figure, circle_figure, step_figure, track_figure
     from srs_opt.measurement.records import StepTest
     from srs_opt.measurement.smooth import Intensity, smooth_shape
     from srs_opt.measurement.steps import fit_step, step_response
