@@ -7,6 +7,7 @@ Then its first cycles are put on ticks and kept, and the window moves on. The la
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -33,7 +34,11 @@ Array = NDArray[np.float64]
 Tell = Callable[[str], None]
 CYCLES, KEPT = 6, 3  # of a window, and how many of them are kept when it moves on
 STEPS = 28  # of a window; half of it gains a fifth less in half the time
-SPARES = (1.0, 2.5)  # tried one after the other where the certificate refuses
+# Steps at most per second of the plan, mending included: about 5 s of processor time. They are counted, so
+# that what is found does not depend on the machine.
+STEPS_PER_S = 26.0
+LEAST_STEPS = 6  # of a window that is mended; fewer leave it where it was
+SPARES = (1.0, 2.5, 5.0)  # of what is optimized from there on, every time that the certificate refuses
 LEAST_GAIN_S = 0.01
 
 
@@ -104,9 +109,10 @@ def refine(problem: Problem, plan: Plan, tell: Tell = lambda message: None) -> R
     """Return the plan with all its switches, cycle ends and pressures optimized for time."""
     began = time.process_time()
     reason = "nothing faster was found"
+    refiner = _Refiner(problem, plan, tell)
     for spare in SPARES:
         try:
-            own = _Refiner(problem, plan, spare, tell).cycles()
+            own = refiner.cycles(spare)
         except NoAnswerError as error:
             reason = str(error)
             continue
@@ -114,15 +120,16 @@ def refine(problem: Problem, plan: Plan, tell: Tell = lambda message: None) -> R
         known = replace(problem, motion=problem.motion.with_own(own, origin))
         numbers = tuple(problem.motion.rest + 1 + k for k in range(len(own)))
         certificate = certify(known, numbers)
-        if not certificate.passed:
-            reason = f"certificate failed: {certificate.reason}"
-            tell(f"refined plan: {reason}")
-            continue
-        better = Plan(plan.planner, numbers, certificate)
-        if better.duration_s < plan.duration_s - LEAST_GAIN_S:
-            return Refinement(known, better, "", plan.duration_s, time.process_time() - began)
-        reason = "nothing faster was found"
-        break
+        if certificate.passed:
+            better = Plan(plan.planner, numbers, certificate)
+            if better.duration_s < plan.duration_s - LEAST_GAIN_S:
+                return Refinement(known, better, "", plan.duration_s, time.process_time() - began)
+            reason = "nothing faster was found"
+            break
+        reason = f"certificate failed: {certificate.reason}"
+        tell(f"refined plan: {reason}")
+        assert certificate.failed_cycle is not None  # it has failed
+        refiner.back_to(certificate.failed_cycle)
     return Refinement(problem, plan, reason, plan.duration_s, time.process_time() - began)
 
 
@@ -134,11 +141,21 @@ def _knows_frequency(run: Integrator) -> bool:
     return not np.allclose(one, other)
 
 
-class _Refiner:
-    """Moves the window along one plan."""
+@dataclass(frozen=True)
+class _Place:
+    """Where a window begins: cycles kept before, what is left of the plan, state, valves before."""
 
-    def __init__(self, problem: Problem, plan: Plan, spare: float, tell: Tell) -> None:
-        self.problem, self.plan, self.spare, self.tell = problem, plan, spare, tell
+    kept: tuple[Joint, ...]
+    guess: tuple[Joint, ...]
+    state: Array
+    before: Before
+
+
+class _Refiner:
+    """Moves the window along one plan; can go back and on again with more room to spare."""
+
+    def __init__(self, problem: Problem, plan: Plan, tell: Tell) -> None:
+        self.problem, self.plan, self.tell = problem, plan, tell
         joints, c = problem.joints, plan.certificate
         numbers = plan.gaits[: int(c.cycle[-1]) + 1]
         found = [joints.joint(a, b) for a, b in zip((problem.motion.rest, *numbers), numbers)]
@@ -149,32 +166,45 @@ class _Refiner:
         kpa = [entry.gait.pressure_kpa for entry in problem.gaits.gaits]
         self.pressures = min(kpa), max(kpa)
 
-    def cycles(self) -> list[Joint]:
-        """Return the refined cycles."""
-        problem, count = self.problem, len(self.planned)
+        self.steps_left = round(STEPS_PER_S * plan.duration_s)
         segments = problem.robot.segments
-        state, slack = at_rest(problem).state, problem.start_slack_m
-        before = Before((0,) * segments, (np.inf,) * segments)
-        kept: list[Joint] = []
-        guess = list(self.planned)  # of what is not kept yet
+        at_start = Before((0,) * segments, (np.inf,) * segments)
+        self.places = [_Place((), tuple(self.planned), at_rest(problem).state, at_start)]
+
+    def back_to(self, cycle: int) -> None:
+        """Go back to the last window that began before a cycle."""
+        while len(self.places) > 1 and len(self.places[-1].kept) >= cycle:
+            self.places.pop()
+
+    def cycles(self, spare: float) -> list[Joint]:
+        """Return the refined cycles; from the last place on, with so much room to spare.
+
+        Raises
+        ------
+        NoAnswerError
+            If a window has no answer, or too few steps are left.
+        """
+        problem, count = self.problem, len(self.planned)
         while True:
-            first = len(kept)
+            here = self.places[-1]
+            first, guess = len(here.kept), list(here.guess)
             size = min(CYCLES, count - first)
             last = first + size == count
             window = Window.of_cycles(guess[:size], problem.joints.limits)
-            if not kept:
+            if not first:
                 window = replace(window, ramp_s=(0.0, *window.ramp_s[1:]))
             full = window
             if last:
                 window = _until(window, self.arrives_s)
             end = End() if last else End(self.ends[first + size - 1])
-            limits = Limits(problem, end, slack if not kept else 0.0, self.spare)
+            limits = Limits(problem, end, 0.0 if first else problem.start_slack_m, spare)
             solver = WindowSolver(
-                problem.integrator, state, limits, before, problem.joints.limits, self.pressures
+                problem.integrator, here.state, limits, here.before, problem.joints.limits, self.pressures
             )
             if not last:
                 solver.tail_s = standing_s(guess[size].gait, problem.joints.limits.dwell_s)
-            found = solver.solve(window, STEPS)
+            found = solver.solve(window, self._steps(count - first))
+            self.steps_left -= solver.steps
             now = size if last else KEPT
             window = self._rounded(solver, found, now)
             if last:
@@ -182,16 +212,25 @@ class _Refiner:
                     window, full, self.arrives_s, problem.joints.limits.dwell_s, problem.joints.limits.tick_s
                 )
             done = [window.cycle(k) for k in range(now)]
-            kept += done
+            kept = (*here.kept, *done)
             if last:
-                return kept
+                return list(kept)
+            state = here.state
             for joint in done:
                 state = self._played(joint, state)
             states, ages_s = gait_end(done[-1].gait)
-            before = Before(tuple(states), tuple(ages_s))
             guess = [*(window.cycle(k) for k in range(now, size)), *guess[size:]]
             guess[size - now] = replace(guess[size - now], from_kpa=window.pressure_kpa[-1])
+            self.places.append(_Place(kept, tuple(guess), state, Before(tuple(states), tuple(ages_s))))
             self.tell(f"refining: {len(kept)} of {count} cycles")
+
+    def _steps(self, cycles: int) -> int:
+        """Return how many steps the next window may take, with so many cycles to go."""
+        windows = 1 + max(0, math.ceil((cycles - CYCLES) / KEPT))
+        steps = min(STEPS, self.steps_left // windows)
+        if steps < LEAST_STEPS:
+            raise NoAnswerError("the steps that were allowed have been taken")
+        return steps
 
     def _rounded(self, solver: WindowSolver, found: Found, cycles: int) -> Window:
         shot = with_slopes(solver.run, solver.start, found.shot)

@@ -70,6 +70,7 @@ class WindowSolver:
         self.run, self.start, self.limits = run, start, limits
         self.before, self.valves, self.pressure_kpa = before, valves, pressure_kpa
         self.tail_s = (0.0,) * len(before.states)
+        self.steps = 0  # taken so far
 
     def judge(self, windows: list[Window]) -> list[Found | None]:
         """Simulate and judge windows; None where the model cannot go on."""
@@ -99,6 +100,7 @@ class WindowSolver:
         for _ in range(most):
             if reach < LEAST_REACH_S or idle > MOST_IDLE:
                 break
+            self.steps += 1
             found = self._around(best, reach)
             if found is None:
                 break

@@ -26,7 +26,7 @@ from planners.search.problem import Problem
 from planners.search.tree import at_rest
 from planners.view.record import motion_record
 from srs_opt.controller.c_source import write_program
-from srs_opt.errors import InputError
+from srs_opt.errors import InputError, NoAnswerError
 from srs_opt.gait_opt.catalogue import default_table
 from srs_opt.robot import load_robot
 from srs_opt.simulate.timeline import Timeline
@@ -116,6 +116,21 @@ def test_a_plan_that_does_not_become_faster_is_kept(planned, monkeypatch):
     assert kept.plan is plan and kept.problem is problem
     assert kept.reason
     assert kept.to_record()["to_s"] == kept.to_record()["from_s"]
+
+
+def test_mending_goes_back_a_window_and_takes_no_more_steps_than_are_left(planned):
+    refiner = refining._Refiner(*planned, lambda message: None)
+    begin = refiner.places[0]
+    refiner.places += [dataclasses.replace(begin, kept=begin.guess[:1] * n) for n in (3, 6, 9)]
+    for failed, kept in ((7, 6), (6, 3), (0, 0)):
+        refiner.back_to(failed)
+        assert len(refiner.places[-1].kept) == kept
+    assert refiner.steps_left == round(refining.STEPS_PER_S * planned[1].duration_s)
+    refiner.steps_left = 40
+    assert (refiner._steps(6), refiner._steps(12)) == (refining.STEPS, 40 // 3)
+    refiner.steps_left = refining.LEAST_STEPS - 1
+    with pytest.raises(NoAnswerError, match="steps"):
+        refiner._steps(6)
 
 
 def test_what_it_cannot_do_is_refused_in_one_line(planned, tmp_path, capsys):
