@@ -39,7 +39,7 @@ def duty_biased(gait: Gait, cycles: float) -> Gait:
 def steered(gait: Gait, miss: Callable[[Gait], float], tolerance: float, most: float = _LARGEST_BIAS) -> Gait:
     """Return the gait duty-biased so that ``miss(gait)``, which grows with turning left, is zero.
 
-    The nearest miss is returned where zero is out of reach.
+    The nearest miss is returned where zero is out of reach, the gait itself where it has no steady state.
     """
     tried: dict[float, float] = {}
 
@@ -51,7 +51,7 @@ def steered(gait: Gait, miss: Callable[[Gait], float], tolerance: float, most: f
                 tried[bias] = np.nan
         return tried[bias]
 
-    if abs(at(0.0)) <= tolerance:
+    if np.isnan(at(0.0)) or abs(at(0.0)) <= tolerance:  # without a steady state there is nothing to steer by
         return gait
     direction = -np.sign(at(0.0))
     below, step = 0.0, 0.02
@@ -74,6 +74,8 @@ def _bisected(at: Callable[[float], float], a: float, b: float, tolerance: float
         fa, fb = at(a), at(b)
         c = (a + b) / 2 if k % 3 == 2 or fa == fb else a - fa * (b - a) / (fb - fa)
         fc = at(c)
+        if np.isnan(fc):
+            break
         if abs(fc) <= tolerance:
             return c
         a, b = (a, c) if fa * fc <= 0 else (c, b)
