@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
+from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Wave
 from srs_opt.gait_opt.collocation.problem import CycleProblem
+from srs_opt.gait_opt.corrections import steered
 from srs_opt.gait_opt.free import intervals_of, merged, notched, repeated, search_free, sum_up
 from srs_opt.gait_opt.goal import Goal, Limits
 from srs_opt.robot import wpi_srs
@@ -57,3 +59,21 @@ def test_one_interval_is_the_wave():
     assert told["wave_speed_m_s"] > 0.545
     assert told["relaxed_speed_m_s"] > told["wave_speed_m_s"]
     assert told["switches_per_s"] == pytest.approx(16.0, rel=0.1)
+
+
+def test_steering_without_a_steady_state_leaves_the_gait_alone():
+    gait = Wave.uniform(4, 2.0, 40.0, 0.9).gait()
+
+    def none(other):
+        raise NoAnswerError("no steady state")
+
+    def some(other):  # none right beyond the gait itself
+        return 1.0 if other == gait else none(other)
+
+    def with_a_hole(other):  # on the way to the root between
+        bias = (other.intervals[0][0][1] - other.intervals[0][0][0] - 0.25) / 0.5
+        return none(other) if -0.018 < bias < -0.002 else 1.0 + 60 * bias
+
+    assert steered(gait, none, 0.1) == gait
+    assert steered(gait, some, 0.1) == gait
+    assert steered(gait, with_a_hole, 1e-3).segments == 4

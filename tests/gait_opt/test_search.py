@@ -381,21 +381,3 @@ def test_gaits_in_step_change_without_a_jerk():
 
     out_of_step = [way(turning.later(part * turning.period_s)) for part in (0.25, 0.75)]
     assert way(turning) > max(out_of_step) + 0.02
-
-
-def test_steering_without_a_steady_state_leaves_the_gait_alone():
-    gait = Wave.uniform(4, 2.0, 40.0, 0.9).gait()
-
-    def none(other):
-        raise NoAnswerError("no steady state")
-
-    def some(other):  # none right beyond the gait itself
-        return 1.0 if other == gait else none(other)
-
-    def with_a_hole(other):  # on the way to the root between
-        bias = (other.intervals[0][0][1] - other.intervals[0][0][0] - 0.25) / 0.5
-        return none(other) if -0.018 < bias < -0.002 else 1.0 + 60 * bias
-
-    assert steered(gait, none, 0.1) == gait
-    assert steered(gait, some, 0.1) == gait
-    assert steered(gait, with_a_hole, 1e-3).segments == 4
