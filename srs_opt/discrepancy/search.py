@@ -48,6 +48,7 @@ HOPELESS = 0.1  # share of the gap that the best known effects leave, from which
 # of its typical size, from which a fit of what linearisation does not see begins; a fifth and the whole find
 # the same flexibility between 50 and 500 1/(N m^2), a tenth takes twice the iterations
 LEAP = 0.35
+NEARER = 0.2  # of the size that slopes promise, from which a refit that got lost is begun again
 FIRM = 10.0  # standard deviations from zero at which an effect is not superfluous, without a refit
 # deviance behind the best, and number, of sets that are fitted again when the noise turns out another
 REFITTED, MOST_REFITTED = 60.0, 5
@@ -335,6 +336,9 @@ class Search:
             start = self._start(current, score)
             beat = min((h.deviance for h in found), default=math.inf)
             hypothesis = self.try_out((*have, score.candidate), start, beat)
+            if hypothesis is not None and self._lost(hypothesis, current):
+                nearer = expected_start(current.linearisation, score, NEARER)
+                hypothesis = self.try_out((*have, score.candidate), nearer, beat)
             if hypothesis is not None:
                 found.append(hypothesis)
             settled = found and min(h.fit.variance_inflation for h in found) == 1
@@ -345,6 +349,15 @@ class Search:
         found.sort(key=cost)
         near = [h for h in found if cost(h) < cost(found[0]) + 2 * RIVAL]
         return self._best_of_whole(near)
+
+    def _lost(self, added: Hypothesis, current: Diagnostics) -> bool:
+        """Whether a refit ended worse than without the effect that it adds, which it holds at size zero.
+
+        Slopes about a fit that is far off promise too much; begun there, a fit may not find back.
+        """
+        key = frozenset(c.label for c in current.hypothesis.candidates), self.quick != self.trials
+        without = self._fits.get(key)
+        return without is not None and added.deviance > without.deviance
 
     def _start(self, current: Diagnostics, score: Score) -> Point:
         """Return where to begin a refit with a candidate added.
