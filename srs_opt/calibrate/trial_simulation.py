@@ -29,6 +29,7 @@ FINEST_M_S = 2e-7
 ACCEPTED = 15.0  # single steps may be worse: friction forgets an error of speed within milliseconds
 ATTEMPTS = 12  # of refining a cycle's mesh; four left a trial a millimetre off where friction is sharpest
 WASTEFUL = 0.3  # share of its steps that would do, below which a mesh is made anew
+SAME_S = 1e-12  # durations of phases nearer than this are the same, and differ by rounding
 _TAIL_S = 0.05  # simulated beyond the last label, for clocks that run late
 _FASTEST_CLOCK = 0.03  # times as long beyond it where clocks may run fast
 # (tolerance, cycle) -> what the valves did, and the mesh that served
@@ -225,10 +226,12 @@ def _fitted(
     if kept[0][count:] != phases[count:]:
         return None
     mesh = kept[1]
-    stretch = duration_s / np.bincount(mesh.phase, mesh.h_s, minlength=count)
-    if np.abs(stretch - 1).max() < 1e-12:  # the same motion again is the same to the last bit
+    known_s = np.bincount(mesh.phase, mesh.h_s, minlength=count)
+    # The same motion again is the same to the last bit. Sums of steps are rounded like the times that they
+    # are differences of, whatever the length of the phase: a share of a short phase would not do.
+    if np.abs(duration_s - known_s).max() < SAME_S:
         return mesh
-    return Mesh(mesh.h_s * stretch[mesh.phase], mesh.phase)
+    return Mesh(mesh.h_s * (duration_s / known_s)[mesh.phase], mesh.phase)
 
 
 def _check(got: StepResult) -> None:

@@ -10,11 +10,18 @@ from srs_opt.calibrate.fit import start_point
 from srs_opt.calibrate.initial_pose import initial_pose
 from srs_opt.calibrate.model import Model
 from srs_opt.calibrate.sensitivity import HAIR, variation
-from srs_opt.calibrate.trial_simulation import FINEST_M_S, TOLERANCE_M_S, conditions_of, tolerance_for
+from srs_opt.calibrate.trial_simulation import (
+    FINEST_M_S,
+    TOLERANCE_M_S,
+    _fitted,
+    conditions_of,
+    tolerance_for,
+)
 from srs_opt.measurement.records import Trial
 from srs_opt.orbit.sensitivity import tangent_kernel
 from srs_opt.robot import wpi_srs
 from srs_opt.simulate.kernel import Course
+from srs_opt.simulate.mesh import Mesh
 from srs_opt.simulate.rosenbrock import BODY_STATES
 
 
@@ -96,3 +103,15 @@ def test_more_data_ask_for_a_finer_simulation():
     assert tolerance_for(60_000, 0.001) == pytest.approx(TOLERANCE_M_S / 2)
     assert tolerance_for(60_000, 0.0005) == pytest.approx(TOLERANCE_M_S / 4)
     assert tolerance_for(10**9, 1e-6) == FINEST_M_S
+
+
+def test_a_mesh_serves_the_same_phases_as_it_is():
+    """However short a phase is: else a motion that is simulated again differs in its last bits."""
+    rng = np.random.default_rng(2)
+    for _ in range(20):
+        durations = np.array([*rng.uniform(0.1, 0.4, 2), 10 ** rng.uniform(-6, -3), rng.uniform(0.1, 0.4)])
+        mesh = Mesh.uniform(durations, 0.005)
+        mesh = mesh.refined(5e-6 * 10 ** rng.uniform(-2, 2, mesh.h_s.size), 5e-6)
+        phases = (*durations, 1.0, -1.0, 1.0, -1.0)
+        assert _fitted((phases, mesh), durations, phases) is mesh
+        assert _fitted((phases, mesh), durations + 1e-6, phases) is not mesh
