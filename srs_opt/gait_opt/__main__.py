@@ -280,8 +280,8 @@ def run(options: argparse.Namespace) -> Answer:
     return Answer(answer, summary(answer), good, tuple(files))
 
 
-def _robots_of_table(options: argparse.Namespace) -> tuple[Robot, ...]:
-    """Return the robots that a table has to serve, the one whose motion it states first."""
+def _robots_of_table(options: argparse.Namespace) -> tuple[tuple[Robot, ...], str]:
+    """Return the robots a table has to serve, the one whose motion it states first, and what to say of it."""
     from srs_opt.gait_opt.any_table import of_any_stiffness, unknown_stiffness, unknown_words
     from srs_opt.gait_opt.robust import in_the_middle
     from srs_opt.robot import load_robot
@@ -289,9 +289,8 @@ def _robots_of_table(options: argparse.Namespace) -> tuple[Robot, ...]:
     robots = softened(options, [load_robot(path) for path in options.robots or [options.robot]])
     asked = options.model or options.stiffness or options.robots or options.warm
     if not asked and unknown_stiffness(robots[0]):
-        say(options, f"note: {unknown_words(robots[0])}")
-        return of_any_stiffness(robots[0])
-    return in_the_middle(robots) if options.stiffness else tuple(robots)
+        return of_any_stiffness(robots[0]), f"note: {unknown_words(robots[0])}"
+    return in_the_middle(robots) if options.stiffness else tuple(robots), ""
 
 
 def _run_table(options: argparse.Namespace) -> Answer:
@@ -321,13 +320,15 @@ def _run_table(options: argparse.Namespace) -> Answer:
     from srs_opt.judge.opinion import Case, opinions
     from srs_opt.robot import save_robot
 
-    robots = _robots_of_table(options)
+    robots, note = _robots_of_table(options)
     if options.worst and len(robots) == 1:
         raise InputError("--worst says which of several robots counts: give --stiffness or --robots with it")
     robot = robots[0]
     model = chosen_model(options, robot)
     if options.judge:
         check_judge([robot])
+    if note:
+        say(options, note)
     begun = time.perf_counter()
     limits = limits_from(options)
     unfinished = options.out / "table.unfinished"  # an interrupted table goes on from here

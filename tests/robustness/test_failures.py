@@ -104,7 +104,7 @@ CASES = [
     ("srs_opt.judge", ["{tmp}/manoeuvre.json"], 2, "expected a key 'start'"),
     ("srs_opt.judge", ["{tmp}/bare/manoeuvre.json"], 2, "valves.csv"),
     ("srs_opt.judge", ["{tmp}/half/manoeuvre.json"], 2, "its gait lacks"),
-    ("srs_opt.judge", ["{tmp}/unsolved/plan.json"], 2, "no solved plan"),
+    ("srs_opt.judge", ["{tmp}/unsolved/plan.json"], 2, "not a solved plan"),
     ("srs_opt.judge", ["{tmp}/alone/plan.json"], 2, "no such file"),
     ("srs_opt.judge", ["{tmp}/gait.json", "--step", "0"], 2, "above 0"),
     ("srs_opt.judge", ["{tmp}/gait.json", "--robot", "{tmp}/cone.yaml"], 2, "per_axis"),
@@ -317,7 +317,7 @@ def test_more_than_fits_into_memory_is_one_line(capsys):
 
     assert run_command(make_parser("x", "y", "z"), greedy, []) == 2
     (line,) = capsys.readouterr().err.splitlines()
-    assert "56 TiB" in line and "ask for less" in line
+    assert "56 TiB" in line and "ask for something shorter" in line
 
 
 def test_points_beyond_the_horizon(files, capsys):
