@@ -28,7 +28,7 @@ from planners.search.clearance import BodyClearance
 from planners.search.problem import Problem
 from srs_opt.gait import Gait
 from srs_opt.gait_opt.collocation.problem import CycleProblem
-from srs_opt.gait_opt.companions import leaned_family
+from srs_opt.gait_opt.companions import duty_biased_family
 from srs_opt.gait_opt.goal import Goal, Limits
 from srs_opt.gait_opt.search import search
 from srs_opt.robot import Robot
@@ -127,7 +127,7 @@ def robots_of(effect: str, folder: Path) -> tuple[Truth, dict[str, Robot], str]:
 
 def planned(robot: Robot, gait: Gait, maze_file: Path) -> tuple[Problem, Plan | None]:
     """Plan through a maze with the fastest gait and its companions."""
-    table = leaned_family(robot, gait)
+    table = duty_biased_family(robot, gait)
     problem = Problem(robot, table, load_motion(robot, table), load_maze(str(maze_file)), MARGIN_M)
     return problem, solve_with_lattice(problem, max_nodes=20_000, time_limit_s=120.0).plan
 

@@ -30,7 +30,7 @@ from planners.plan.solve import BEAM, BEAMS, LatticeSolver
 from planners.search.problem import Problem
 from srs_opt.files import write_json
 from srs_opt.gait_opt.catalogue import default_table
-from srs_opt.gait_opt.companions import leaned_family, wave_family
+from srs_opt.gait_opt.companions import duty_biased_family, wave_family
 from srs_opt.gait_opt.table import GaitTable, load_table
 from srs_opt.robot import Robot, wpi_srs
 
@@ -50,7 +50,7 @@ TableMotion = tuple[GaitTable, MotionTable]
 def own_family(robot: Robot, table: GaitTable) -> GaitTable:
     """Return the family of the table's fastest straight gait."""
     straight = [e for e in table.gaits if abs(e.turn_rate_rad_s) < STRAIGHT_RAD_S]
-    return leaned_family(robot, max(straight, key=lambda e: e.speed_m_s).gait)
+    return duty_biased_family(robot, max(straight, key=lambda e: e.speed_m_s).gait)
 
 
 def maze_named(name: str, size: RobotSize) -> Maze:

@@ -16,8 +16,9 @@ import numpy as np
 from benchmarks.planner_mazes import CELLS_M, LIMIT_S, MARGIN_M, NODES, contest_maze, setting
 from benchmarks.section import Section
 from benchmarks.stored import gather, stored_rows, study_parser
-from planners.drive.execute import execute
+from planners.drive.execute import Execution, execute
 from planners.motion.robots import with_friction_times
+from planners.plan.answer import Plan
 from planners.plan.solve import solve_with_lattice
 from planners.search.problem import Problem
 from srs_opt.robot import Robot
@@ -52,6 +53,13 @@ def attempt(kind: str, seed: int) -> Row:
         "robot": kind,
         "maze": problem.maze.name,
         "planned": True,
+        **drive_row(plan, driven),
+    }
+
+
+def drive_row(plan: Plan, driven: Execution) -> Row:
+    """Return what a row says of a drive."""
+    return {
         "plan_s": plan.duration_s,
         "drive_s": driven.duration_s,
         "reached": driven.reached,

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from benchmarks.planner_true_robots import drive_row
 from benchmarks.section import Section
 from benchmarks.stored import gather, stored_rows, study_parser
 from planners.drive.execute import execute
@@ -40,17 +41,7 @@ def attempt(planned_for: str, stiffness: float) -> Row:
     row: Row = {"plan": planned_for, "ei_n_m2": stiffness, "planned": plan is not None}
     if plan is None:
         return row
-    driven = execute(problem, plan, true)
-    return {
-        **row,
-        "plan_s": plan.duration_s,
-        "drive_s": driven.duration_s,
-        "reached": driven.reached,
-        "collisions": driven.collisions,
-        "clearance_m": driven.smallest_clearance_m,
-        "replans": driven.replans,
-        "reason": driven.reason,
-    }
+    return row | drive_row(plan, execute(problem, plan, true))
 
 
 def section(rows: list[Row], when: str) -> Section:

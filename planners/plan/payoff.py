@@ -17,7 +17,7 @@ from planners.plan.options import MARGIN_M
 from planners.plan.solve import solve_with_lattice
 from planners.search.problem import Problem
 from srs_opt.gait import Gait
-from srs_opt.gait_opt.companions import leaned_family
+from srs_opt.gait_opt.companions import duty_biased_family
 from srs_opt.gait_opt.table import GaitTable
 from srs_opt.robot import Robot
 
@@ -130,7 +130,7 @@ def maze_payoff(
 
 def _run_plan(robot: Robot, gait: Gait, truth: Robot, maze: Maze, model: str, tell: Tell) -> PlanRun | None:
     tell(f"planning through {maze.name}{' with the effects' if robot is truth else ''}")
-    problem = _problem(robot, leaned_family(robot, gait, model), maze)
+    problem = _problem(robot, duty_biased_family(robot, gait, model), maze)
     plan = solve_with_lattice(problem, max_nodes=MOST_NODES, time_limit_s=TIME_LIMIT_S).plan
     if plan is None:
         return None

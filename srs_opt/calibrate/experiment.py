@@ -103,7 +103,7 @@ class Experiment:
         stale: bool = False,
         rough: bool = False,
     ) -> dict[str, NormalEquations]:
-        """Return the Gram matrices of several trials.
+        """Return the normal equations of several trials.
 
         With `stale` the slopes may be those of the last request for the same coordinates, which costs a
         fifth; the residuals are always those at `point`. With `rough` motions are good enough for a model

@@ -64,8 +64,8 @@ class Request:
     ----------
     point : Point
     coordinates : tuple of Coordinate, optional
-        By which the motions are derived for Gram matrices; the scattering parameters are among them. Without,
-        the residuals are asked for.
+        By which the motions are derived for normal equations; the scattering parameters are among them.
+        Without, the residuals are asked for.
     extra : callable, optional
         Residual functions, as further columns.
     stale : bool
@@ -174,7 +174,7 @@ class Trials:
         self._new_slopes = set()
 
     def answer(self, names: Sequence[str], request: Request) -> dict[str, Answer]:
-        """Return the trials' Gram matrices or residuals (T, 2 M), or why there are none; side by side."""
+        """Return the trials' normal equations or residuals (T, 2 M), or why there are none; side by side."""
         found: dict[str, Answer] = {}
         for first in range(0, len(names), AT_ONCE):
             some = names[first : first + AT_ONCE]

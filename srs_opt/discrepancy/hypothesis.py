@@ -116,6 +116,11 @@ def fit_hypothesis(
     return Hypothesis(tuple(candidates), found)
 
 
+def fit_key(candidates: Sequence[Candidate], quick: bool) -> tuple[frozenset[str], bool]:
+    """Return what tells a fit from others: its effects in any order, and whether to a part of the trials."""
+    return frozenset(c.label for c in candidates), quick
+
+
 def cost(hypothesis: Hypothesis) -> float:
     """Return the deviance, counting 2 per parameter."""
     return hypothesis.deviance + 2 * hypothesis.parameters

@@ -24,6 +24,7 @@ from srs_opt.discrepancy.hypothesis import (
     Hypothesis,
     cost,
     fit_hypothesis,
+    fit_key,
     left_of,
     stuck,
 )
@@ -119,7 +120,7 @@ class Search:
         """Fit a set of effects; None where the motion cannot be simulated."""
         quick = quick and self.quick != self.trials
         trials = self.quick if quick else self.trials
-        key = (frozenset(c.label for c in candidates), quick)
+        key = fit_key(candidates, quick)
         known = self._fits.get(key)
         if known is not None and known.fit.converged:
             return known
@@ -324,8 +325,8 @@ class Search:
 
     def _tried_out(self, hypothesis: Hypothesis) -> float:
         """Return what the start of a few trials says against a hypothesis that was fitted to all."""
-        key = frozenset(c.label for c in hypothesis.candidates), True
-        tried = self._fits.get(key) or self.try_out(hypothesis.candidates, hypothesis.fit.point)
+        known = self._fits.get(fit_key(hypothesis.candidates, True))
+        tried = known or self.try_out(hypothesis.candidates, hypothesis.fit.point)
         return math.inf if tried is None else cost(tried)
 
     def _refit(self, current: Diagnostics, proposals: list[Score], most: int) -> Hypothesis | None:
@@ -355,8 +356,7 @@ class Search:
 
         Slopes about a fit that is far off promise too much; begun there, a fit may not find back.
         """
-        key = frozenset(c.label for c in current.hypothesis.candidates), self.quick != self.trials
-        without = self._fits.get(key)
+        without = self._fits.get(fit_key(current.hypothesis.candidates, self.quick != self.trials))
         return without is not None and added.deviance > without.deviance
 
     def _start(self, current: Diagnostics, score: Score) -> Point:

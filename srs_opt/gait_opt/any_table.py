@@ -6,10 +6,11 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from srs_opt.gait_opt.catalogue import cached_table_path, known_table
+from srs_opt.gait_opt.entries import certified_table
 from srs_opt.gait_opt.family import TABLE_PRESSURE_KPA, build_table
 from srs_opt.gait_opt.goal import Limits
 from srs_opt.gait_opt.robust import in_the_middle, of_stiffness
-from srs_opt.gait_opt.robust_table import robust_table
+from srs_opt.gait_opt.robust_table import chosen_table
 from srs_opt.gait_opt.softness import MOST_LINKS, STIFFNESSES_N_M2
 from srs_opt.gait_opt.table import GaitTable, save_table
 from srs_opt.robot import Robot
@@ -78,4 +79,5 @@ def make_table(
         basis = built(rigid, "complex")
         if usual(limits):
             save_table(basis, cached_table_path(rigid))
-    return robust_table(tuple(robots), model, basis, limits, worst, say, jobs=jobs, cluster=cluster)
+    table = chosen_table(tuple(robots), model, basis, limits, worst, say, jobs=jobs)
+    return certified_table(robots[0], table, limits, say, jobs=jobs, cluster=cluster)

@@ -17,7 +17,7 @@ OFFSETS = (0.0, 0.15, 0.3, 0.45, 0.6, 0.7, 0.8, 0.9)
 SLOWEST_M_S = 0.03
 
 
-def leaned_family(robot: Robot, gait: Gait, model: str = "complex") -> GaitTable:
+def duty_biased_family(robot: Robot, gait: Gait, model: str = "complex") -> GaitTable:
     """Return a straight gait duty-biased to either side, forward and backward, in the controller's ticks.
 
     Parameters
@@ -55,7 +55,7 @@ def _family(robot: Robot, leaning: Callable[[float], Gait], model: str) -> GaitT
     return GaitTable(robot.name, robot.fingerprint(), model, tuple(entries))
 
 
-def leaned_gaits(gait: Gait, tick_s: float) -> list[tuple[str, Gait]]:
+def duty_biased_gaits(gait: Gait, tick_s: float) -> list[tuple[str, Gait]]:
     """Return a straight gait duty-biased to either side, forward and backward, by name."""
     return _gaits(lambda offset: duty_biased(gait, math.asin(offset) / math.pi), tick_s)
 

@@ -14,9 +14,8 @@ import numpy as np
 
 from srs_opt.errors import InputError, NoAnswerError
 from srs_opt.gait import Gait, published_wave
-from srs_opt.gait_opt.companions import leaned_gaits
+from srs_opt.gait_opt.companions import duty_biased_gaits
 from srs_opt.gait_opt.corrections import on_ticks
-from srs_opt.gait_opt.entries import certified_table
 from srs_opt.gait_opt.goal import STRAIGHT_RAD_S, Limits
 from srs_opt.gait_opt.replayed import SLOWEST_M_S
 from srs_opt.gait_opt.softness import robust_beside
@@ -32,9 +31,8 @@ def robust_companions(robot: Robot, limits: Limits) -> list[tuple[str, Gait]]:
     gait = robust_beside(robot, limits)
     if gait is None:
         return []
-    return [
-        (_name(name), on_ticks(other, limits.tick_s)) for name, other in leaned_gaits(gait, limits.tick_s)
-    ]
+    family = duty_biased_gaits(gait, limits.tick_s)
+    return [(_name(name), on_ticks(other, limits.tick_s)) for name, other in family]
 
 
 def _name(leaning: str) -> str:
@@ -44,7 +42,7 @@ def _name(leaning: str) -> str:
     return " ".join(["robust", *([side + offset[1:]] if side else []), *way])
 
 
-def robust_table(
+def chosen_table(
     robots: tuple[Robot, ...],
     model: str,
     rigid: GaitTable,
@@ -53,9 +51,10 @@ def robust_table(
     say: Say = lambda text: None,
     *,
     jobs: int = 1,
-    cluster: str | None = None,
 ) -> GaitTable:
     """Return the gaits that serve all `robots`, the best worst speed first; the motion is the first robot's.
+
+    The entries carry no certificates.
 
     Parameters
     ----------
@@ -71,21 +70,6 @@ def robust_table(
     NoAnswerError
         If no gait serves all, or the published gait does not move one of them.
     """
-    table = chosen_table(robots, model, rigid, limits, worst, say, jobs=jobs)
-    return certified_table(robots[0], table, limits, say, jobs=jobs, cluster=cluster)
-
-
-def chosen_table(
-    robots: tuple[Robot, ...],
-    model: str,
-    rigid: GaitTable,
-    limits: Limits,
-    worst: str = "relative",
-    say: Say = lambda text: None,
-    *,
-    jobs: int = 1,
-) -> GaitTable:
-    """Return `robust_table` without certificates. Raises as it does."""
     if len({robot.links for robot in robots}) > 1:
         raise InputError("a gait table for several robots needs the same number of links in all of them")
     named = [(entry.name, entry.gait, entry.planned) for entry in rigid.gaits]

@@ -14,7 +14,6 @@ import numpy as np
 from scipy import sparse
 from scipy.optimize import linprog
 
-from srs_opt.errors import NoAnswerError
 from srs_opt.manoeuvre.order import OrderRows, standing_s
 from srs_opt.manoeuvre.rows import RowMaker, Rows
 from srs_opt.manoeuvre.shooting import STEP_S, Shot, shoot, shoot_with_slopes
@@ -211,19 +210,3 @@ def smoothed(robot_run: Integrator, friction_speed_m_s: float) -> Integrator:
     return Integrator(
         robot.with_values(friction_speed_m_s=friction_speed_m_s), robot_run.structure.model, room=False
     )
-
-
-def run_stages(
-    run: Integrator, task: Task, plan: ValvePlan, speeds: tuple[float, ...], most: int = 60
-) -> Candidate:
-    """Return the optimum that continuation over friction smoothing speeds leads to, the robot's own last."""
-    best: Candidate | None = None
-    for speed in (*speeds, 0.0):
-        solver = Solver(smoothed(run, speed), task)
-        found = solver.solve(plan, most)
-        plan = found.plan
-        if speed == 0.0:
-            best = found
-    if best is None:
-        raise NoAnswerError("no smoothing speed led to a plan")
-    return best

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from srs_opt.measurement.chain import Chain, chain_of
-from srs_opt.measurement.noise import FEWEST, noise_sd, third_differences
+from srs_opt.measurement.noise import noise_sd
 from srs_opt.measurement.plausible import factor_of_thousand
 from srs_opt.measurement.records import TAIL_TO_HEAD, Array, Trial
 from srs_opt.problem import Report
@@ -18,6 +18,7 @@ from srs_opt.table import NumberTable, read_numbers
 MAX_MISSING_ROWS = 5
 FARTHEST_M = 1e5  # from the origin; a fit to 1e308 m ends in not-a-number, not in an answer
 TOP_SPEED_LENGTHS_PER_S = 25.0
+FEWEST_DIFFERENCES = 100  # from which on the noise that a track shows is compared
 
 
 @dataclass(frozen=True, eq=False)
@@ -247,9 +248,9 @@ def _check_speed(track: Track, robot: Robot, good_clock: bool, report: Report) -
 
 def _check_noise(track: Track, marker_sd_m: float, report: Report) -> None:
     """Compare the noise that the tracks show with the one that dataset.yaml states."""
-    if len(third_differences(track.points_m)) < FEWEST or not marker_sd_m > 0:
+    if not marker_sd_m > 0:
         return
-    ratio = noise_sd(track.points_m) / marker_sd_m
+    ratio = noise_sd(track.points_m, FEWEST_DIFFERENCES) / marker_sd_m
     message = f"marker noise is {ratio:.2g} times camera.marker_sd_m ({marker_sd_m:g} m)"
     if ratio > 200 or 0 < ratio < 1 / 200:
         report.error(track.file, None, f"{message}: units?")
