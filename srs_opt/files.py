@@ -5,12 +5,14 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import shutil
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import IO, Any
 
 from srs_opt.errors import InputError
+from srs_opt.interrupts import signals_deferred
 
 MAX_TEXT_BYTES = 64 * 1024 * 1024
 
@@ -19,20 +21,39 @@ MAX_TEXT_BYTES = 64 * 1024 * 1024
 def atomic_path(target: Path | str) -> Iterator[Path]:
     """Yield a temporary path beside `target`; move it into place on success, remove it on failure."""
     target = Path(target)
-    with _explained(target):
-        target.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=target.parent, prefix=".partial-", suffix=target.suffix)
-        os.close(handle)
-    temporary = Path(name)
+    temporary = None
     try:
         with _explained(target):
+            target.parent.mkdir(parents=True, exist_ok=True)
+            with signals_deferred():  # else the file could be there and its name not yet known here
+                handle, name = tempfile.mkstemp(dir=target.parent, prefix=".partial-", suffix=target.suffix)
+                temporary = Path(name)
+            os.close(handle)
             yield temporary
             umask = os.umask(0)
             os.umask(umask)
             temporary.chmod(0o666 & ~umask)
             os.replace(temporary, target)
     finally:
-        temporary.unlink(missing_ok=True)
+        if temporary is not None:
+            temporary.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def temporary_folder(parent: Path | None = None, prefix: str = "srs_opt-") -> Iterator[Path]:
+    """Yield a new folder (in `parent`, else the system's) that is removed with what it holds.
+
+    tempfile.TemporaryDirectory leaves it behind if SIGTERM arrives while it is made or removed.
+    """
+    folder = None
+    try:
+        with signals_deferred():
+            folder = Path(tempfile.mkdtemp(dir=parent, prefix=prefix))
+        yield folder
+    finally:
+        if folder is not None:
+            with signals_deferred():
+                shutil.rmtree(folder, ignore_errors=True)
 
 
 @contextlib.contextmanager

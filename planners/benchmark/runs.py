@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import io
 import sqlite3
-import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from multiprocessing import get_context
@@ -20,6 +19,7 @@ from planners.search.ompl_setup import seeded
 from planners.search.problem import Problem
 from srs_opt import plugins
 from srs_opt.errors import NoAnswerError
+from srs_opt.files import temporary_folder
 
 T = TypeVar("T")
 QUERY = (
@@ -141,8 +141,8 @@ def recorded(bench: Any) -> tuple[str, list[tuple[str, float, bool, bool]]]:
     """
     from ompl import tools
 
-    with tempfile.TemporaryDirectory() as scratch:
-        log, rows = Path(scratch) / "runs.log", Path(scratch) / "runs.db"
+    with temporary_folder() as scratch:
+        log, rows = scratch / "runs.log", scratch / "runs.db"
         bench.saveResultsToFile(str(log))
         with contextlib.redirect_stdout(io.StringIO()):  # it tells what it parses
             tools.readBenchmarkLog(str(rows), [str(log)], False)

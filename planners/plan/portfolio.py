@@ -24,7 +24,7 @@ from planners.plan.solve import BEAM, TOO_NARROW, LatticeSolver
 from planners.search.ompl_setup import MISSING, has_ompl
 from planners.search.problem import Problem
 from srs_opt import plugins
-from srs_opt.parallel.interrupts import workers_deaf_to_interrupts
+from srs_opt.interrupts import workers_deaf_to_interrupts
 
 FIRST_NODES = 3000  # cycles that our searches look at in the first round; doubled every round
 FIRST_ITERATIONS = 1000  # of another planner

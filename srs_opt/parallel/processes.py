@@ -9,7 +9,7 @@ from multiprocessing.connection import Connection
 from typing import Any, TypeVar
 
 from srs_opt.errors import NoAnswerError
-from srs_opt.parallel.interrupts import workers_deaf_to_interrupts
+from srs_opt.interrupts import workers_deaf_to_interrupts
 from srs_opt.parallel.protocol import HERE, Groups, Shared, Work
 
 T = TypeVar("T")

@@ -19,7 +19,6 @@ import signal
 import stat
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Callable
 from functools import lru_cache
@@ -28,6 +27,8 @@ from pathlib import Path
 import casadi as ca
 
 from srs_opt.errors import InputError
+from srs_opt.files import temporary_folder
+from srs_opt.interrupts import signals_deferred
 from srs_opt.model.effects.plugins import registered
 
 FLAGS = ("-O1", "-fPIC", "-shared", "-fno-math-errno")
@@ -167,8 +168,8 @@ def _whole(path: Path) -> bool:
 
 def _compile(source: str, path: Path, command: list[str]) -> None:
     path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=path.parent, prefix=".building-") as folder:
-        file, target = Path(folder) / "model.c", Path(folder) / "model.so"
+    with temporary_folder(path.parent, ".building-") as folder:
+        file, target = folder / "model.c", folder / "model.so"
         file.write_text(source, encoding="utf-8")
         command = [*command, str(file), "-o", str(target), "-lm"]
         _run(command, timeout_s=900)
@@ -180,21 +181,24 @@ def _compile(source: str, path: Path, command: list[str]) -> None:
 def _run(command: list[str], timeout_s: float) -> str:
     """Run a compiler and return what it prints, in whatever encoding; none of its processes outlives us."""
     apart = os.name == "posix"  # Ctrl-C is ours to pass on
-    process = subprocess.Popen(
-        command,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        encoding="utf-8",
-        errors="replace",
-        start_new_session=apart,
-    )
+    process = None
     try:
+        with signals_deferred():  # one that came while the process starts would leave it unknown to us
+            process = subprocess.Popen(
+                command,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                encoding="utf-8",
+                errors="replace",
+                start_new_session=apart,
+            )
         out, complaints = process.communicate(timeout=timeout_s)
     except BaseException:
-        if apart:
-            os.killpg(process.pid, signal.SIGKILL)  # gcc's own processes too
-        process.kill()
-        process.communicate()
+        if process is not None:
+            if apart:
+                os.killpg(process.pid, signal.SIGKILL)  # gcc's own processes too
+            process.kill()
+            process.communicate()
         raise
     if process.returncode:
         raise subprocess.CalledProcessError(process.returncode, command, out, complaints)

@@ -10,7 +10,14 @@ ROOT = Path(__file__).resolve().parents[2]
 
 # From the bottom up. A module belongs to the longest prefix that fits it.
 LAYERS = (
-    ("srs_opt", "planners", "srs_opt.errors", "srs_opt.plugins", "srs_opt.callable_package"),
+    (
+        "srs_opt",
+        "planners",
+        "srs_opt.errors",
+        "srs_opt.interrupts",
+        "srs_opt.plugins",
+        "srs_opt.callable_package",
+    ),
     ("srs_opt.files", "srs_opt.parallel"),
     ("srs_opt.document", "srs_opt.figures", "srs_opt.command", "srs_opt.result"),
     ("srs_opt.problem", "srs_opt.table"),

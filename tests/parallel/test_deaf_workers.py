@@ -28,7 +28,7 @@ with executor(2) as where:
 SPAWNED = """
 from multiprocessing import get_context
 from deaf import deaf
-from srs_opt.parallel.interrupts import workers_deaf_to_interrupts
+from srs_opt.interrupts import workers_deaf_to_interrupts
 if __name__ == "__main__":
     with workers_deaf_to_interrupts():
         pool = get_context("spawn").Pool(2)

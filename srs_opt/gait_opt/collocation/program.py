@@ -16,8 +16,8 @@ from srs_opt.gait_opt.collocation.layout import ROBOT_UNKNOWNS, Layout, local_in
 from srs_opt.gait_opt.collocation.point import PointKind, point_functions
 from srs_opt.gait_opt.collocation.solver import Solver, nlp_solver
 from srs_opt.gait_opt.collocation.sparse import Gather, hessian_gather, jacobian_gather, to_dm
+from srs_opt.interrupts import signals_not_lost
 from srs_opt.model.registry import build
-from srs_opt.parallel.interrupts import interrupt_not_lost
 
 IPOPT = Solver()
 
@@ -199,7 +199,7 @@ class Program:
             }  # fmt: skip
             arguments |= {"lam_g0": warm.multipliers_g, "lam_x0": warm.multipliers_z}
         function = self._solver(solver, changes)
-        with interrupt_not_lost():
+        with signals_not_lost():
             out = function(**arguments)
         stats = function.stats()
         found = np.asarray(out["x"]).ravel()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib
 import subprocess
 import sys
-import tempfile
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -13,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from srs_opt.errors import InputError
-from srs_opt.files import read_bytes
+from srs_opt.files import read_bytes, temporary_folder
 from srs_opt.measurement.records import Array
 from srs_opt.measurement.takes.sheet import read_sheet
 from srs_opt.measurement.takes.take import (
@@ -77,8 +76,8 @@ _PATIENCE_S = 120
 
 
 def _by_child(path: Path) -> dict[str, Any]:
-    with tempfile.TemporaryDirectory() as folder:
-        made = Path(folder) / "points.npz"
+    with temporary_folder() as folder:
+        made = folder / "points.npz"
         command = [sys.executable, "-c", _CHILD, str(path.resolve()), str(made)]
         try:
             done = subprocess.run(command, capture_output=True, timeout=_PATIENCE_S, check=False, text=True)
