@@ -183,7 +183,8 @@ class Snake:
         """Return the angle of every hinge (T, hinges) without load."""
         segment = [hinge.segment for hinge in self._hinges]
         length = np.array(self.body.segment_lengths_m)[segment]
-        return curvature[:, segment] * (length * [hinge.share for hinge in self._hinges])
+        angles_rad: Array = curvature[:, segment] * (length * [hinge.share for hinge in self._hinges])
+        return angles_rad
 
     def _spring_rests(self, bends: Array, rates: Array) -> list[tuple[Any, list[float]]]:
         """Return the soft hinges of chambers with their springs' rest angles at every step.

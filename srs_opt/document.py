@@ -80,7 +80,7 @@ for _tag, (_pattern, _first) in _SCALARS.items():
     )
 _Loader.add_constructor(
     "tag:yaml.org,2002:int",
-    lambda loader, node: int(str(loader.construct_scalar(node))),  # type: ignore[arg-type]  # no octal
+    lambda loader, node: int(str(loader.construct_scalar(node))),  # no octal
 )
 
 

@@ -99,7 +99,7 @@ def plain_names(figure: Figure) -> None:
                 powers.update(axis.get_ticklabels(which="both"))
     for text in figure.findobj(Text):
         if text not in powers:
-            text.set_parse_math(False)  # type: ignore[attr-defined]
+            text.set_parse_math(False)
 
 
 def line_key(label: str, **style: Any) -> Line2D:

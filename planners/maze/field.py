@@ -64,7 +64,8 @@ class DistanceField:
         low = flat[node] * (1 - du) + flat[node + right] * du
         node += up * columns
         high = flat[node] * (1 - du) + flat[node + right] * du
-        return np.minimum(low * (1 - dv) + high * dv, _inward(self.bounds, xy))
+        clearance_m: NDArray[np.float64] = np.minimum(low * (1 - dv) + high * dv, _inward(self.bounds, xy))
+        return clearance_m
 
     def at_least(self, points: ArrayLike) -> NDArray[np.float64]:
         """Return a distance in metres that the exact one is never below: `clearance` less its error."""
@@ -148,7 +149,8 @@ def _transform(occupied: NDArray[np.bool_], spacing: float) -> NDArray[np.float3
     if not occupied.any():
         return np.full(occupied.shape, np.inf, dtype=np.float32)
     cells: Any = distance_transform_edt(~occupied)
-    return np.multiply(cells, spacing, dtype=np.float32, casting="same_kind")
+    distance_m: NDArray[np.float32] = np.multiply(cells, spacing, dtype=np.float32, casting="same_kind")
+    return distance_m
 
 
 def _from_shapes(

@@ -127,7 +127,7 @@ def _pixels(path: Path) -> tuple[NDArray[np.float32], int]:
 
 def _grey(image: Any) -> NDArray[np.float32]:
     if image.mode.startswith("I"):  # 16 bits
-        return np.asarray(image, dtype=np.float32) / np.float32(257)
+        return np.asarray(np.asarray(image, dtype=np.float32) / np.float32(257), dtype=np.float32)
     if image.mode in ("L", "1"):
         return np.asarray(image.convert("L"), dtype=np.float32)
     channels = np.asarray(image.convert("RGBA"))

@@ -54,7 +54,7 @@ class Walls:
     @cached_property
     def outlines(self) -> NDArray[Any]:
         """Polygons that contain the walls, at most 0.13 % of the radius too large; shape (n,)."""
-        outlines = self.skeletons.copy()
+        outlines: NDArray[Any] = self.skeletons.copy()
         thick = self.radii > 0
         if thick.any():
             outlines[thick] = shapely.buffer(
@@ -84,7 +84,7 @@ class Walls:
         walls farther away than that are not looked for (much faster), and the limit is the answer.
         """
         limit = np.broadcast_to(np.asarray(limit_m, dtype=float), (len(geometries),))
-        nearest = limit.copy()
+        nearest: NDArray[np.float64] = limit.copy()
         if not len(self) or not len(geometries):
             return nearest
         if np.isfinite(limit).all():
@@ -103,7 +103,8 @@ class Walls:
         if not len(self):
             return np.zeros((0, 4))
         grow = self.radii[:, None] * np.array([-1.0, -1.0, 1.0, 1.0])
-        return np.asarray(shapely.bounds(self.skeletons), dtype=float) + grow
+        boxes: NDArray[np.float64] = np.asarray(shapely.bounds(self.skeletons), dtype=float) + grow
+        return boxes
 
     def scaled(self, factor: float) -> Walls:
         """Return walls with all lengths multiplied by `factor` (about the origin)."""

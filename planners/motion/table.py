@@ -100,7 +100,10 @@ class MotionTable:
         allowed = self.allowed[self.row(before)]
         if before <= self.rest:
             return np.asarray(allowed)
-        return allowed & [self.joints.joint(before, now) is not None for now in range(self.size)]
+        followers: NDArray[np.bool_] = allowed & [
+            self.joints.joint(before, now) is not None for now in range(self.size)
+        ]
+        return followers
 
     def with_own(self, own: Sequence[Joint], origin: Sequence[int]) -> MotionTable:
         """Return the table with cycles made for one plan, and the gaits that they have come from."""

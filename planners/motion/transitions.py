@@ -174,7 +174,7 @@ def _ends(run: Integrator, entry: TableGait, cycle: CycleRun, speeds: np.ndarray
 
 
 def _at_origin(state: np.ndarray) -> np.ndarray:
-    moved = state.copy()
+    moved: np.ndarray = state.copy()
     moved[:3] = 0.0
     return moved
 

@@ -125,7 +125,7 @@ def straight_pose(sighting: Sighting, chain: Chain, heading_rad: float) -> Array
     """Return the pose of the straight robot that a sighting shows; `heading_rad` says which turn it is in."""
     if sighting.markers_m is None:
         assert sighting.pose is not None  # a sighting has one or the other
-        pose = sighting.pose.copy()
+        pose: Array = sighting.pose.copy()
     else:
         seen = np.isfinite(sighting.markers_m[:, 0])
         along = (np.arange(chain.links) - (chain.links - 1) / 2)[seen] * chain.pitch_m

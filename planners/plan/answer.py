@@ -54,7 +54,8 @@ class Plan:
         # of the last cycle only what was played until arrival counts
         last = problem.motion.period_s[gaits[len(costs) - 1]]
         left = float(problem.motion.period_s[gaits[: len(costs)]].sum()) - self.duration_s
-        return sum(costs) - costs[-1] * min(left / last, 1.0)
+        cost: float = sum(costs) - costs[-1] * min(left / last, 1.0)
+        return cost
 
     def air_j(self, problem: Problem) -> float:
         """Return the energy of the air that the plan's cycles take."""

@@ -277,4 +277,5 @@ def clearances(problem: Problem, lines: Array, limit_m: float | None = None) -> 
 def _sagitta(problem: Problem, kappa: Array) -> Array:
     """Return by how much the arcs leave the chords that stand for them, per instant."""
     chord = problem.robot.segment_length_m / POINTS_PER_ARC
-    return np.abs(kappa).max(axis=1) * chord**2 / 8
+    sagitta_m: Array = np.abs(kappa).max(axis=1) * chord**2 / 8
+    return sagitta_m

@@ -44,7 +44,8 @@ class BodyClearance:
 
         Off by the table's error at most; negative inside walls.
         """
-        return self.field.clearance(lines).min(axis=-1) - self.half_width_m
+        clearance_m: Array = self.field.clearance(lines).min(axis=-1) - self.half_width_m
+        return clearance_m
 
     def exact(self, lines: Array) -> Array:
         """Return the exact clearance (m) of each body, (n,), for centre lines (n, points, 2).

@@ -103,7 +103,8 @@ class CostModel:
             return np.full(in_time.shape, 1 / self.top_speed_m_s) + TIME_COUNTS * in_time
         moving = self.speed_m_s > SLOW * self.top_speed_m_s
         least = (self.air_j[moving] / (self.speed_m_s[moving] * self.period_s[moving])).min()
-        return TYPICAL_OVER_LEAST * least / self._air_w + TIME_COUNTS * in_time
+        price: Array = TYPICAL_OVER_LEAST * least / self._air_w + TIME_COUNTS * in_time
+        return price
 
     def _nearness(self, spare_m: Array) -> Array:
         """Return the factor on the cost near walls."""

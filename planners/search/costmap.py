@@ -146,4 +146,5 @@ def slowness(room: Array, reach: Array, speed: Array) -> Array:
     best = np.where(fitting >= 0, speed[np.maximum(fitting, 0)], 0.25 * speed[0])
     best = np.maximum(best, 0.1 * speed[-1])
     comfortable = np.clip(room / (COMFORT * reach[int(speed.argmax())]), 0.3, 1.0)
-    return 1 / (best * comfortable)
+    cost: Array = 1 / (best * comfortable)
+    return cost

@@ -205,4 +205,7 @@ def _sources(goal: Goal, nodes: Array) -> NDArray[np.int64]:
     inside = np.flatnonzero(away <= max(float(away.min()), 0.0))
     allowed = [k for k in range(COURSES) if goal.heading_error(k * STEP_RAD) <= STEP_RAD / 2]
     courses = np.array(allowed or range(COURSES))
-    return ((inside[:, None, None] * COURSES + courses[:, None]) * 2 + np.array([0, 1])).ravel()
+    states: NDArray[np.int64] = (
+        (inside[:, None, None] * COURSES + courses[:, None]) * 2 + np.array([0, 1])
+    ).ravel()
+    return states

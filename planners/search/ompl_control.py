@@ -50,7 +50,7 @@ def as_ompl_planner(
     """
     from ompl import base
 
-    class Plain(base.Planner):  # type: ignore[misc, name-defined]
+    class Plain(base.Planner):  # type: ignore[misc]
         def __init__(self) -> None:
             super().__init__(cycles.information, name)
 

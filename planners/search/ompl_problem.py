@@ -143,7 +143,8 @@ def cycle_setup(problem: Problem) -> CycleSetup:
 
 def gait_of(problem: Problem, command: Any) -> int:
     """Return the gait that a control stands for."""
-    return min(max(math.floor(command[0]), 0), problem.motion.size - 1)
+    gait: int = min(max(math.floor(command[0]), 0), problem.motion.size - 1)
+    return gait
 
 
 def gaits_of(problem: Problem, path: Any) -> tuple[int, ...]:
@@ -203,7 +204,7 @@ def _state_space(base: Any, problem: Problem) -> Any:
 
 
 def _goal(base: Any, info: Any, problem: Problem, memory: Memory) -> Any:
-    class Arrived(base.GoalRegion):  # type: ignore[misc, name-defined]
+    class Arrived(base.GoalRegion):  # type: ignore[misc]
         """In the goal when any instant of the cycle was."""
 
         def __init__(self) -> None:
@@ -222,7 +223,7 @@ def _goal(base: Any, info: Any, problem: Problem, memory: Memory) -> Any:
 
 
 def _objective(base: Any, info: Any, memory: Memory) -> Any:
-    class PriceOfCycles(base.OptimizationObjective):  # type: ignore[misc, name-defined]
+    class PriceOfCycles(base.OptimizationObjective):  # type: ignore[misc]
         """What the cycles between two nodes cost."""
 
         def __init__(self) -> None:

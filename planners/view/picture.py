@@ -160,4 +160,5 @@ def _thinned(time_s: NDArray[Any], instants: NDArray[Any]) -> NDArray[Any]:
         return instants
     wanted = np.arange(time_s[instants[0]], time_s[instants[-1]] + BODY_STEP_S, BODY_STEP_S)
     near = np.searchsorted(time_s[instants], wanted).clip(0, instants.size - 1)
-    return instants[np.unique(near)]
+    chosen: NDArray[Any] = instants[np.unique(near)]
+    return chosen

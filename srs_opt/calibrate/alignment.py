@@ -49,7 +49,8 @@ class Alignment:
         """Return derivatives of points, (T, 2 M, K), turned with them."""
         frames, values, count = slopes.shape
         pairs = slopes.reshape(frames, values // 2, 2, count)
-        return np.einsum("ij,tmjk->tmik", self.matrix, pairs).reshape(slopes.shape)
+        turned: np.ndarray = np.einsum("ij,tmjk->tmik", self.matrix, pairs).reshape(slopes.shape)
+        return turned
 
     def pose(self, pose: np.ndarray) -> np.ndarray:
         """Return poses (T, 3), moved alike."""

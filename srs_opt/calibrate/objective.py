@@ -228,4 +228,5 @@ def projected(
 
 def sum_eliminated(equations: Mapping[str, NormalEquations], inflation: float = 1.0) -> np.ndarray:
     """Return the sum of the trials' matrices, scatter integrated out."""
-    return np.sum([g.eliminated(inflation).matrix for g in equations.values()], axis=0)
+    total: np.ndarray = np.sum([g.eliminated(inflation).matrix for g in equations.values()], axis=0)
+    return total

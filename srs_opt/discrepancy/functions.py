@@ -54,7 +54,7 @@ class ResidualFunctions:
         spread = np.where(table.std(axis=0) > 0, table.std(axis=0), np.inf)
         first = trials[0].markers_m
         markers = 1 if first is None else first.shape[1]
-        return ResidualFunctions(markers, tuple(table.mean(axis=0)), tuple(spread))  # type: ignore[arg-type]
+        return ResidualFunctions(markers, tuple(table.mean(axis=0)), tuple(spread))
 
     @property
     def parts(self) -> tuple[tuple[str, int], ...]:

@@ -169,4 +169,5 @@ def _first_seconds(trial: Trial) -> Trial:
 
 def _shared(a: Trial, b: Trial) -> int:
     keys = ("frequency_hz", "pressure_kpa", "offset", "heading_rad")
-    return sum(getattr(a, k) == getattr(b, k) for k in keys) ** 2
+    shared: int = sum(getattr(a, k) == getattr(b, k) for k in keys) ** 2
+    return shared

@@ -276,6 +276,9 @@ def _in_goal(goal: Mapping[str, Any], centre: Array) -> NDArray[np.bool_]:
     """Return whether each point lies in the goal's disc or boxes."""
     boxes = goal.get("boxes") or []
     if not boxes:
-        return np.hypot(centre[:, 0] - goal["x"], centre[:, 1] - goal["y"]) <= goal["radius"]
+        return np.asarray(
+            np.hypot(centre[:, 0] - goal["x"], centre[:, 1] - goal["y"]) <= goal["radius"], dtype=np.bool_
+        )
     x, y = centre.T
-    return np.any([(x0 <= x) & (x <= x1) & (y0 <= y) & (y <= y1) for x0, y0, x1, y1 in boxes], axis=0)
+    inside = [(x0 <= x) & (x <= x1) & (y0 <= y) & (y <= y1) for x0, y0, x1, y1 in boxes]
+    return np.asarray(np.any(inside, axis=0), dtype=np.bool_)

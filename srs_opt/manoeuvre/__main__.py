@@ -22,6 +22,7 @@ from srs_opt.command import (
 
 if TYPE_CHECKING:
     from srs_opt.gait import Gait
+    from srs_opt.gait_opt.table import GaitTable
     from srs_opt.manoeuvre.task import Task
     from srs_opt.robot import Robot
     from srs_opt.simulate.integrate import Integrator
@@ -163,7 +164,7 @@ def _on_ticks(options: argparse.Namespace, gait: Gait) -> Gait:
     return gait.on_ticks(options.tick)
 
 
-def _table(options: argparse.Namespace, robot: Robot, model: str) -> Any:
+def _table(options: argparse.Namespace, robot: Robot, model: str) -> GaitTable:
     from srs_opt.gait_opt.catalogue import default_table
 
     return default_table(robot, model, say=lambda text: say(options, text))

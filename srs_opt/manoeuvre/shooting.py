@@ -145,7 +145,8 @@ def _jacobians(run: Integrator, course: Course, states: np.ndarray) -> np.ndarra
     ]
     found, _ = jacobian_kernel(run.structure).run(parts)
     columns = [found[: part.h_s.size, nx:, lane] for lane, part in enumerate(parts)]
-    return np.concatenate(columns).reshape(n, nx + 1, nx).transpose(0, 2, 1)
+    jacobian: np.ndarray = np.concatenate(columns).reshape(n, nx + 1, nx).transpose(0, 2, 1)
+    return jacobian
 
 
 def _course(run: Integrator, start: np.ndarray, plan: ValvePlan, step_s: float) -> Course:

@@ -54,7 +54,8 @@ class Chain:
     @cached_property
     def spacing_m(self) -> Array:
         """Distances of markers that follow each other when straight, (M - 1,)."""
-        return np.linalg.norm(np.diff(self.straight_m, axis=0), axis=1)
+        lengths_m: Array = np.linalg.norm(np.diff(self.straight_m, axis=0), axis=1)
+        return lengths_m
 
     def between_m(self, a: int, b: int) -> float:
         """Distance of two markers when straight: they cannot be farther apart, save for offsets sideways."""
@@ -89,7 +90,8 @@ def headings(chain: Chain, q: Array) -> Array:
     """Return the links' headings theta_i, shape (..., N): theta_{i+1} = theta_i + l kappa_i."""
     steps = chain.segment_length_m * q[..., 3:]
     relative = np.concatenate([np.zeros((*steps.shape[:-1], 1)), np.cumsum(steps, axis=-1)], axis=-1)
-    return q[..., 2:3] + relative - relative.mean(axis=-1, keepdims=True)
+    angles_rad: Array = q[..., 2:3] + relative - relative.mean(axis=-1, keepdims=True)
+    return angles_rad
 
 
 def link_positions(chain: Chain, q: Array) -> Array:
@@ -100,7 +102,8 @@ def link_positions(chain: Chain, q: Array) -> Array:
     gaps = chain.gap_length_m / 2 * (_unit(theta[..., :-1]) + _unit(theta[..., 1:]))
     steps = gaps + chain.segment_length_m * length[..., None] * _unit(middle)
     relative = np.concatenate([np.zeros((*steps.shape[:-2], 1, 2)), np.cumsum(steps, axis=-2)], axis=-2)
-    return q[..., None, :2] + relative - relative.mean(axis=-2, keepdims=True)
+    points_m: Array = q[..., None, :2] + relative - relative.mean(axis=-2, keepdims=True)
+    return points_m
 
 
 def position_jacobian(chain: Chain, q: Array) -> Array:

@@ -166,7 +166,8 @@ def _blocks(time: np.ndarray, end: float, period: float, cycles: int) -> np.ndar
     """Return the block (whole cycles from the end; half cycles when there are few) of every sample."""
     count = min(cycles if cycles >= FEWEST_BLOCKS else 2 * cycles, MOST_BLOCKS)
     number = np.floor((end - time) / period * count / cycles + 1e-9).astype(int)
-    return np.clip(number, 0, count - 1)
+    interval: np.ndarray = np.clip(number, 0, count - 1)
+    return interval
 
 
 def _jackknife(

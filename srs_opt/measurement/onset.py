@@ -239,7 +239,8 @@ def _drifts(flat: Array, sd: float) -> bool:
     steps = np.arange(len(flat)) - (len(flat) - 1) / 2
     slope = steps @ flat / (steps @ steps)
     chi2 = float((slope**2).sum() * (steps @ steps)) / max(sd, 1e-9) ** 2
-    return chi2 > flat.shape[1] + DRIFT * np.sqrt(2 * flat.shape[1])
+    drifts: bool = chi2 > flat.shape[1] + DRIFT * np.sqrt(2 * flat.shape[1])
+    return drifts
 
 
 def first_motion(flat: Array, sd: float) -> int | None:

@@ -130,7 +130,8 @@ def _normal_equations(chain: Chain, points: Array, sd: float, q: Array) -> tuple
 
 
 def _cost(chain: Chain, points: Array, sd: float, prior: Array, q: Array) -> Array:
-    return (residuals(chain, points, q) ** 2).sum(axis=1) / sd**2 + (q**2 * prior).sum(axis=1)
+    cost: Array = (residuals(chain, points, q) ** 2).sum(axis=1) / sd**2 + (q**2 * prior).sum(axis=1)
+    return cost
 
 
 def _levenberg_marquardt(
@@ -210,7 +211,7 @@ def _line_positions(chain: Chain, q: Array, along: Array) -> Array:
 
 def _fill(chain: Chain, points: Array) -> Array:
     """Fill lost positions for the first guess: along time, then along the chain."""
-    filled = points.copy()
+    filled: Array = points.copy()
     frames, count = np.arange(len(points)), chain.markers
     for marker in range(count):
         seen = np.isfinite(points[:, marker, 0])

@@ -156,7 +156,7 @@ def likeliest_intensity(problem: _Problem) -> Intensity:
     start = np.array(START_LOG10)
     simplex = start + np.vstack([np.zeros(3), np.eye(3)])
     options: dict[str, Any] = {"xatol": 0.05, "fatol": 0.2, "maxfev": 80, "initial_simplex": simplex}
-    found = minimize(cost, start, method="Nelder-Mead", options=options)  # type: ignore[call-overload]
+    found = minimize(cost, start, method="Nelder-Mead", options=options)
     return Intensity(*(float(v) for v in 10.0**found.x))
 
 
@@ -299,4 +299,5 @@ def _marginals(diagonal: Array, coupling: Array) -> Array:
     covariance = inverse
     for k in range(frames - 2, -1, -1):
         covariance[k] = inverse[k] + gains[k] @ covariance[k + 1] @ gains[k].T
-    return (covariance + covariance.transpose(0, 2, 1)) / 2
+    symmetric: Array = (covariance + covariance.transpose(0, 2, 1)) / 2
+    return symmetric

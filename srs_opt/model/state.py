@@ -71,7 +71,8 @@ class StateLayout:
     @property
     def size(self) -> int:
         """Number of states."""
-        return self.actuator.stop
+        size: int = self.actuator.stop
+        return size
 
     @property
     def dynamic(self) -> list[int]:

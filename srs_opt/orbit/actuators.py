@@ -76,7 +76,8 @@ def actuator_multiplier(run: Integrator, gait: Gait, act: np.ndarray, p: np.ndar
 
 def _fine(durations: np.ndarray) -> np.ndarray:
     """Return how many steps of the integration each phase takes where no closed form exists."""
-    return np.maximum(np.ceil(durations / 0.0025).astype(int), 2)
+    steps: np.ndarray = np.maximum(np.ceil(durations / 0.0025).astype(int), 2)
+    return steps
 
 
 @lru_cache(maxsize=32)

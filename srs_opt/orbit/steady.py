@@ -250,7 +250,7 @@ def orbit_of(run: Integrator, gait: Gait, solution: PeriodicSolution) -> Orbit:
 def travelling(robot: Robot, gait: Gait, model: str | None = None) -> np.ndarray:
     """Return the state (nx,) of a steady gait at its time 0, at the origin, travelling along x."""
     orbit = steady_gait(robot, gait, model)
-    state = orbit.solution.start.copy()
+    state: np.ndarray = orbit.solution.start.copy()
     dx, dy, turn = orbit.motion.displacement
     course = math.atan2(dy, dx) - turn / 2 + (math.pi if orbit.speed_m_s < 0 else 0.0)
     state[POSE] = 0.0, 0.0, state[HEADING] - course

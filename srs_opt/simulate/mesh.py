@@ -104,7 +104,7 @@ def _density(error: np.ndarray, tolerance: float) -> np.ndarray:
 
 def _smoothed(density: np.ndarray) -> np.ndarray:
     """Widen peaks by one step to either side: features move a little when steps change."""
-    wide = density.copy()
+    wide: np.ndarray = density.copy()
     wide[1:] = np.maximum(wide[1:], 0.7 * density[:-1])
     wide[:-1] = np.maximum(wide[:-1], 0.7 * density[1:])
     return wide

@@ -96,7 +96,8 @@ def valve_levels(gait: Gait, mesh: CycleMesh, first_s: float) -> np.ndarray:
     spread = (np.arange(20) + 0.5) / 20
     at = mesh.edges[:-1, None] + np.diff(mesh.edges)[:, None] * spread
     states = [[gait.valve(first_s + a * gait.period_s) for a in row] for row in at]
-    return np.mean(states, axis=1)
+    mean: np.ndarray = np.mean(states, axis=1)
+    return mean
 
 
 def _centre(displacement: np.ndarray) -> np.ndarray:
@@ -174,4 +175,5 @@ def state_scales(x: np.ndarray, kind: PointKind) -> np.ndarray:
     least[2] = 1e-6
     for a, b in groups:
         size[a:b] = size[a:b].max() if a < BODY else np.maximum(size[a:b], 0.05 * size[a:b].max())
-    return np.maximum(size, least)
+    scale: np.ndarray = np.maximum(size, least)
+    return scale

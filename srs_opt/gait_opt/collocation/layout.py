@@ -45,7 +45,8 @@ class Mesh:
 
     def points(self) -> np.ndarray:
         """Return the collocation points, (3 n,)."""
-        return (self.edges[:-1, None] + np.diff(self.edges)[:, None] * NODES).ravel()
+        instants: np.ndarray = (self.edges[:-1, None] + np.diff(self.edges)[:, None] * NODES).ravel()
+        return instants
 
 
 @dataclass(frozen=True)

@@ -63,7 +63,8 @@ def defects(p: Program, solution: Solution, parameters: np.ndarray, mesh: Mesh, 
     turns = parameters[sizes[5 + 3 * robot] : sizes[6 + 3 * robot]].reshape(n, DEGREE, kind.switches)
     turns = turns[:, : BETWEEN.size].reshape(points, kind.switches).T
     rates = np.asarray(function(y.T, scale, numbers, half_width, turns))[:s].T.reshape(n, BETWEEN.size, s)
-    return np.abs(slope - rates)[:, :, : min(3, BODY)].max(axis=(1, 2))
+    error: np.ndarray = np.abs(slope - rates)[:, :, : min(3, BODY)].max(axis=(1, 2))
+    return error
 
 
 def refined_cuts(defect: np.ndarray, cuts: Cuts, tolerance: float) -> Cuts:
