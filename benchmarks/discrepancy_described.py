@@ -65,7 +65,7 @@ def right_description(
     said : sequence of mapping
         The answer's `effects`: `name` and `parameters` of generic terms.
     """
-    from srs_opt.model.effects.generic import TERMS
+    from srs_opt.effects.generic import TERMS
 
     if len(truth) != 1 or len(said) != 1 or said[0]["name"] not in TERMS:
         return False, False

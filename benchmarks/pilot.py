@@ -19,7 +19,6 @@ import numpy as np
 from benchmarks.planner_mazes import contest_maze, setting
 from benchmarks.section import Section
 from benchmarks.stored import gather, stored_rows, study_parser
-from planners.motion.table import body_in_room
 from planners.pilot.pose import Report, parse_report
 from planners.pilot.session import PilotedDrive, pilot
 from planners.plan.answer import Plan
@@ -28,6 +27,7 @@ from planners.plan.solve import solve_with_lattice
 from planners.search.problem import Problem
 from srs_opt.controller.c_source import write_program
 from srs_opt.controller.program import Program
+from srs_opt.geometry import points_in_room
 from srs_opt.simulate.shapes import centre_lines
 from virtual_lab.truth import Truth
 from virtual_lab.world import DEFAULT, Imperfections, World
@@ -88,7 +88,7 @@ class VirtualPilot:
         track, problem = self.world.track, self.arena.problem
         pose = np.array([[*places.mean(axis=0), heading.mean()] for _, places, heading, _ in track])
         kappa = np.array([kappa for *_, kappa in track])
-        return float(clearances(problem, body_in_room(centre_lines(problem.integrator, kappa), pose)).min())
+        return float(clearances(problem, points_in_room(centre_lines(problem.integrator, kappa), pose)).min())
 
 
 def virtual_pilot(

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import casadi as ca
 
+from srs_opt.effects import register_effect
+from srs_opt.effects.effect import Effect, Symbols
+from srs_opt.effects.parameter import EffectParameter
 from srs_opt.gait import published_wave
-from srs_opt.model.effects import register_effect
-from srs_opt.model.effects.effect import Effect, Symbols
-from srs_opt.model.effects.parameter import EffectParameter
 from srs_opt.orbit.steady import steady_gait
 from srs_opt.robot import load_robot
 

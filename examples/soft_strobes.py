@@ -6,8 +6,8 @@ from srs_opt.figures import COLOURS, PAGE_IN, draw_body, new_figure, save_figure
 from srs_opt.gait_opt.catalogue import shipped_table
 from srs_opt.gait_opt.robust import of_stiffness
 from srs_opt.gait_opt.softness import robust_gait
+from srs_opt.geometry import rotate
 from srs_opt.orbit.body import body_over_cycle, integrator
-from srs_opt.orbit.motion import rotate
 from srs_opt.orbit.steady import Orbit, steady_gait
 from srs_opt.robot import Robot, wpi_srs
 

@@ -9,8 +9,8 @@ from srs_opt.gait import published_wave
 from srs_opt.gait_opt.collocation.problem import CycleProblem
 from srs_opt.gait_opt.goal import Goal, Limits
 from srs_opt.gait_opt.search import search
+from srs_opt.geometry import centre_of_rotation
 from srs_opt.orbit.body import body_over_cycle, integrator
-from srs_opt.orbit.motion import centre_of_rotation
 from srs_opt.orbit.steady import Orbit, steady_gait
 from srs_opt.robot import wpi_srs
 

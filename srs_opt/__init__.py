@@ -46,11 +46,11 @@ _PUBLIC = {
     "load_table": "srs_opt.gait_opt.table",
     "load_dataset": "srs_opt.measurement.dataset",
     "diagnose": "srs_opt.discrepancy.pipeline",
-    "register_effect": "srs_opt.model.effects.__init__",
+    "register_effect": "srs_opt.effects.__init__",
     "Maze": "planners.maze.maze",
     "load_maze": "planners.maze.load",
-    "plan": "planners.plan.route",
-    "drive_plan": "planners.plan.route",
+    "plan": "planners.apps.route",
+    "drive_plan": "planners.apps.route",
 }
 _CALLABLE = ("simulate", "gait_map", "calibrate", "judge")  # packages that are called like functions
 __all__ = sorted([*_PUBLIC, *_CALLABLE])

@@ -1,6 +1,6 @@
 """Plugins: files that the command line names with --plugin, and entry points of installed packages.
 
-A plugin registers what it defines when it is run (`srs_opt.model.effects.register_effect`,
+A plugin registers what it defines when it is run (`srs_opt.effects.register_effect`,
 `srs_opt.gait_opt.objectives.registry.register_objective`, `planners.plan.registry.register_planner`). A
 robot file may say which plugins it needs; loading it never runs one.
 """

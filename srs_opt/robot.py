@@ -142,7 +142,7 @@ class Robot:
         if not self.is_soft:
             record.pop("bending_relaxation_s", None)
         if self.effects:
-            from srs_opt.model.effects import own_definitions
+            from srs_opt.effects import own_definitions
 
             definitions = own_definitions([str(spec["name"]) for spec in self.effects])
             record |= {f"definition of {name}": digest for name, digest in definitions.items()}
@@ -150,7 +150,7 @@ class Robot:
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
     def __reduce__(self) -> tuple[Any, ...]:  # read-only effects do not pickle; worker processes need robots
-        from srs_opt.model.effects import plugins
+        from srs_opt.effects import plugins
 
         return _restored, (self.to_record(), plugins.exported())
 
@@ -159,7 +159,7 @@ class Robot:
 
 
 def _bending(effects: tuple[EffectSpec, ...]) -> bool:
-    from srs_opt.model.effects import known_effects
+    from srs_opt.effects import known_effects
 
     known = known_effects()
     return any(known[e["name"]].bends and e[known[e["name"]].size.name] != 0 for e in effects)
@@ -178,7 +178,7 @@ def _plain(value: Any) -> Any:
 def _restored(record: dict[str, Any], own_effects: bytes | None = None) -> Robot:
     """Rebuild a robot that another process sent, with the effects of one's own that are known there."""
     if own_effects is not None:
-        from srs_opt.model.effects import plugins
+        from srs_opt.effects import plugins
 
         plugins.adopt(own_effects)
     record["plugins"] = tuple(record["plugins"])
@@ -200,12 +200,12 @@ def robot_from_document(document: Document) -> Robot:
     if misplaced:
         raise misplaced[0]
     if record.get("plugins"):
-        from srs_opt.model.effects.entries import check_plugins
+        from srs_opt.effects.entries import check_plugins
 
         check_plugins(document, record["plugins"])
     record["plugins"] = tuple(record.get("plugins", ()))
     if "effects" in record:
-        from srs_opt.model.effects.entries import check_effects
+        from srs_opt.effects.entries import check_effects
 
         record["effects"] = check_effects(document, record["effects"], int(record.get("links", 5)))
     for key, value in record.items():
@@ -215,7 +215,7 @@ def robot_from_document(document: Document) -> Robot:
     if robot.has_stiffness and robot.bending_relaxation_s is None:
         robot = dataclasses.replace(robot, bending_relaxation_s=RELAXATION_S)
     if robot.effects:
-        from srs_opt.model.effects.entries import check_body
+        from srs_opt.effects.entries import check_body
 
         check_body(document, robot.effects, robot.links, robot.link_mass_kg, robot.gap_length_m)
     return robot
@@ -257,7 +257,7 @@ def _misplaced(document: Document) -> list[InputError]:
 
 def _effect_problems(document: Document, entries: Any, links: Any) -> list[InputError]:
     """Return what is wrong with the single effects; entries without a name are the schema's business."""
-    from srs_opt.model.effects.entries import check_effect
+    from srs_opt.effects.entries import check_effect
 
     found = []
     for index, entry in enumerate(entries if isinstance(entries, list) else ()):
@@ -293,8 +293,8 @@ def save_robot(robot: Robot, path: Path | str, header: str = "") -> Path:
     """Write `robot` as a robot file (atomically); lists and tables in readable YAML, below a comment."""
     import yaml
 
+    from srs_opt.effects import needed_plugins
     from srs_opt.files import write_text
-    from srs_opt.model.effects import needed_plugins
 
     record = robot.to_record()
     needed = needed_plugins([str(spec["name"]) for spec in robot.effects])

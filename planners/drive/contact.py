@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from planners.motion.table import body_in_room
 from planners.plan.certify import EXACT_BELOW
 from planners.search.clearance import BodyClearance
 from planners.search.problem import Problem
 from planners.search.tree import arrival_index
+from srs_opt.geometry import points_in_room
 from srs_opt.robot import Robot
 from srs_opt.simulate.integrate import Integrator
 from srs_opt.simulate.shapes import centre_lines
@@ -48,7 +48,7 @@ class BodyWatch:
 
         Times (n,) start at 0, poses are (n, 3), curvatures (n, N-1). The record also ends at contact.
         """
-        lines = body_in_room(centre_lines(self._run, kappa), pose)
+        lines = points_in_room(centre_lines(self._run, kappa), pose)
         room = self._clearances(lines)
         arrived = arrival_index(self._goal, pose) if ends else None
         contact = int(np.argmax(room <= 0)) if (room <= 0).any() else None

@@ -17,6 +17,7 @@ from planners.motion.robots import undelayed
 from planners.plan.answer import Plan
 from planners.search.problem import Problem
 from planners.view.record import maze_record
+from srs_opt.geometry import rotate_back
 from srs_opt.judge.bodies import body_of, check_engine, drive_of, pull_of, slope_of
 from srs_opt.judge.walls import boxes_of
 from srs_opt.model.state import FORWARD, SIDEWAYS, YAW_MOMENTUM
@@ -76,8 +77,7 @@ class EnginePlant:
         state = self.run.rest(float(pose[0]), float(pose[1]), float(pose[2]))
         velocity, turning = self._snake.link_velocities(), self._snake.turn_rates()
         own = mass @ velocity / mass.sum()
-        c, s = math.cos(pose[2]), math.sin(pose[2])
-        state[FORWARD], state[SIDEWAYS] = c * own[0] + s * own[1], c * own[1] - s * own[0]
+        state[FORWARD], state[SIDEWAYS] = rotate_back(pose[2], own[0], own[1])
         arm = np.stack([seen.x_m[-1], seen.y_m[-1]], axis=1) - pose[:2]
         inertia = np.array([link.inertia_kg_m2 for link in self._snake.body.links])
         state[YAW_MOMENTUM] = (

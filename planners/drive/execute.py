@@ -14,12 +14,14 @@ from planners.drive.contact import BodyWatch
 from planners.drive.friction_ensemble import FrictionEnsemble
 from planners.drive.halt import halt
 from planners.drive.plant import Plant, PlantStopped, SimulatedPlant
-from planners.drive.track import Choice, Learned, Where, by_plan, choose, nearest_node, reference_of
+from planners.drive.reference import reference_of
 from planners.plan.answer import Plan
 from planners.plan.solve import solve_with_lattice
 from planners.search.problem import ROUNDING_M, Problem
+from planners.search.track import Choice, Learned, Where, by_plan, choose, nearest_node
 from planners.search.tree import Root, arrival_index
 from srs_opt.errors import InputError, NoAnswerError
+from srs_opt.geometry import relative
 from srs_opt.model.parameters import valve_delay_s
 from srs_opt.model.state import FORWARD, POSE, POSE_AND_SPEED
 from srs_opt.robot import Robot
@@ -235,9 +237,7 @@ class Drive:
     def _own_cycle(self, number: int) -> Choice:
         """Return a cycle that was made for the plan, which says what it should do."""
         k = self.plan.gaits.index(number)
-        c, s = math.cos(self.ends[k, 2]), math.sin(self.ends[k, 2])
-        dx, dy, turn = self.ends[k + 1, :3] - self.ends[k, :3]
-        moved = np.array([[[0.0, 0.0, 0.0], [c * dx + s * dy, c * dy - s * dx, turn]]])
+        moved = np.stack([np.zeros(3), relative(self.ends[k, :3], self.ends[k + 1, :3])])[None]
         common = replace(self.learned, own={})
         predicted = common.apply(moved, self.problem.joints.gait(number).period_s)
         return Choice(number, predicted[0, -1], math.inf, 0.0)
@@ -295,9 +295,7 @@ class Drive:
         if arrived:
             return "arrived"
         self.ensemble.learn(before, cycle, self.state, (gait_before, index))
-        c, s = math.cos(begin[2]), math.sin(begin[2])
-        dx, dy, turn = self.state[POSE] - begin
-        observed = np.array([c * dx + s * dy, c * dy - s * dx, turn])
+        observed = relative(begin, self.state[POSE])
         self.learned = self.learned.update(
             self.predicted,
             observed,

@@ -17,6 +17,7 @@ from planners.motion.robots import undelayed, with_friction_times
 from planners.search.problem import Problem
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait_opt.robust import stiffness_interval, stiffness_key
+from srs_opt.geometry import wrapped
 from srs_opt.model.state import POSE_AND_SPEED
 from srs_opt.orbit.body import integrator
 from srs_opt.robot import Robot
@@ -163,5 +164,5 @@ def _miss(foreseen: Trajectory | NoAnswerError, after: Array, scales: Array) -> 
     if isinstance(foreseen, NoAnswerError):
         return math.inf
     off = foreseen.final[POSE_AND_SPEED] - after[POSE_AND_SPEED]
-    off[2] = (off[2] + math.pi) % (2 * math.pi) - math.pi
+    off[2] = wrapped(off[2])
     return float(((off / scales) ** 2).sum())

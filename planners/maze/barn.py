@@ -20,6 +20,7 @@ from planners.maze.places import Pose
 from planners.maze.walls import Walls
 from srs_opt.errors import InputError
 from srs_opt.files import read_text
+from srs_opt.geometry import rotate
 
 PAD_M = 4.0
 UPRIGHT_RAD = 0.05
@@ -160,9 +161,8 @@ def _pose(element: ElementTree.Element | None, where: str) -> Pose:
 
 
 def _compose(base: Pose, inner: Pose) -> Pose:
-    c, s = math.cos(base.heading), math.sin(base.heading)
-    x, y = base.x + c * inner.x - s * inner.y, base.y + s * inner.x + c * inner.y
-    return Pose(x, y, base.heading + inner.heading)
+    x, y = rotate(base.heading, inner.x, inner.y)
+    return Pose(base.x + float(x), base.y + float(y), base.heading + inner.heading)
 
 
 def _shape(geometry: ElementTree.Element | None, at: Pose, where: str) -> Shape | None:

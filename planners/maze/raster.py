@@ -11,6 +11,7 @@ import shapely
 from numpy.typing import NDArray
 
 from planners.maze.places import Box, Pose
+from srs_opt.geometry import rotate, rotate_back
 
 Unknown = Literal["wall", "free"]
 """What cells that nobody has seen are taken for."""
@@ -50,15 +51,13 @@ class Raster:
 
     def to_grid(self, xy: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return points, shape (..., 2), in metres along the grid's own axes from its corner."""
-        c, s = math.cos(self.origin.heading), math.sin(self.origin.heading)
         dx, dy = xy[..., 0] - self.origin.x, xy[..., 1] - self.origin.y
-        return np.stack([c * dx + s * dy, c * dy - s * dx], axis=-1)
+        return np.stack(rotate_back(self.origin.heading, dx, dy), axis=-1)
 
     def to_world(self, uv: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return points, shape (..., 2), from the grid's own axes in the maze's."""
-        c, s = math.cos(self.origin.heading), math.sin(self.origin.heading)
-        u, v = uv[..., 0], uv[..., 1]
-        return np.stack([self.origin.x + c * u - s * v, self.origin.y + s * u + c * v], axis=-1)
+        x, y = rotate(self.origin.heading, uv[..., 0], uv[..., 1])
+        return np.stack([self.origin.x + x, self.origin.y + y], axis=-1)
 
     def frame(self) -> Any:
         """Return the outline of the whole grid as a shapely polygon."""

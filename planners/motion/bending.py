@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from srs_opt.drive.calibration import DriveCalibration
+from srs_opt.geometry import compose, distance_along, relative, turn_by
 
 Array = NDArray[np.float64]
 _STRAIGHT_RAD = 1e-6
@@ -62,26 +63,21 @@ class Bending:
         chord = np.where(straight, speed, radius * np.sin(half + more / 2) / np.sin(half))
         bent = more[..., None] * share
         c, s = chord[..., None] * np.cos(bent / 2), chord[..., None] * np.sin(bent / 2)
-        x, y = pose[..., 0], pose[..., 1]
-        return np.stack([c * x - s * y, s * x + c * y, pose[..., 2] + bent], axis=-1)
+        return np.stack([*turn_by(c, s, pose[..., 0], pose[..., 1]), pose[..., 2] + bent], axis=-1)
 
     def placed(self, pose: Array, before: int, gait: int, share: Array) -> Array:
         """Return a cycle's poses (samples, 3) in the room as they are measured to be."""
         if self.none:
             return pose
-        x, y, heading = pose[0]
-        c, s = np.cos(heading), np.sin(heading)
-        dx, dy = pose[:, 0] - x, pose[:, 1] - y
-        moved = np.stack([c * dx + s * dy, c * dy - s * dx, pose[:, 2] - heading], axis=-1)
-        px, py, turned = self.local(moved, float(self.course[gait] - self.course[before]), share).T
-        return np.stack([x + c * px - s * py, y + s * px + c * py, heading + turned], axis=-1)
+        swing = float(self.course[gait] - self.course[before])
+        return compose(pose[0], self.local(relative(pose[0], pose), swing, share))
 
     def tube_m(self, pose: Array, gait: int, most_m: float = math.inf) -> Array:
         """Return how far a cycle may be from its poses (samples, 3), measured when it begins, two sigma.
 
         What the stiffness's deviation does counts up to `most_m` at the cycle's end.
         """
-        way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(pose[:, :2], axis=0).T))])
+        way = distance_along(pose[:, :2])
         measured = self.calibration.margin_m(1.0) * way
         if self.deviation_m is None:
             return np.asarray(measured)

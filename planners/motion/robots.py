@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from srs_opt.model.effects import known_effects
+from srs_opt.effects import known_effects
 from srs_opt.robot import Robot
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from planners.motion.bending import Bending
 from planners.motion.valves import Joint, Joints
+from srs_opt.geometry import compose, points_in_room
 
 STILL = 0.25  # body widths per cycle; what moves less has no direction of travel
 SAMPLES = 16  # intervals per cycle at which pose and body are kept
@@ -115,7 +116,7 @@ class MotionTable:
         low, weight = self._level(before, speed_m_s)
         tables = self.pose[before], self.speed_after_m_s[before]
         local, after = ((1 - weight) * t[:, low] + weight * t[:, low + 1] for t in tables)
-        return Motion(placed(local, x, y, heading), after)
+        return Motion(compose(np.array([x, y, heading]), local), after)
 
     def move_one(
         self, x: float, y: float, heading: float, before: int, speed_m_s: float, now: int
@@ -125,7 +126,7 @@ class MotionTable:
         low, weight = self._level(before, speed_m_s)
         tables = self.pose[before, now], self.speed_after_m_s[before, now]
         local, after = ((1 - weight) * t[low] + weight * t[low + 1] for t in tables)
-        return placed(local, x, y, heading), float(after)
+        return compose(np.array([x, y, heading]), local), float(after)
 
     def bent(self, bending: Bending) -> MotionTable:
         """Return the table with measured factors on all its cycles."""
@@ -144,7 +145,7 @@ class MotionTable:
 
     def bodies(self, before: int, now: NDArray[np.int64] | slice, pose: Array) -> Array:
         """Return centre lines in the room, (gaits, SAMPLES + 1, points, 2), for poses of the same gaits."""
-        return body_in_room(self.body[self.row(before), now], pose)
+        return points_in_room(self.body[self.row(before), now], pose)
 
     @cached_property
     def allowed(self) -> NDArray[np.bool_]:
@@ -182,22 +183,3 @@ def courses(steady: Array, still_m: float) -> Array:
     backwards = dx < 0
     chord = np.arctan2(np.where(backwards, -dy, dy), np.where(backwards, -dx, dx))
     return np.where(np.hypot(dx, dy) > still_m, chord - turn / 2, 0.0)
-
-
-def placed(local: Array, x: float, y: float, heading: float) -> Array:
-    """Move poses (..., 3) from the frame of a cycle's start to the room."""
-    c, s = np.cos(heading), np.sin(heading)
-    px, py = local[..., 0], local[..., 1]
-    return np.stack([x + c * px - s * py, y + s * px + c * py, heading + local[..., 2]], axis=-1)
-
-
-def body_in_room(body: NDArray[np.float32] | Array, pose: Array) -> Array:
-    """Place centre lines (..., points, 2) of the robot's frame at poses (..., 3)."""
-    c, s = np.cos(pose[..., 2])[..., None], np.sin(pose[..., 2])[..., None]
-    bx, by = body[..., 0], body[..., 1]
-    out = np.empty(bx.shape + (2,))
-    np.subtract(c * bx, s * by, out=out[..., 0])
-    np.add(s * bx, c * by, out=out[..., 1])
-    out[..., 0] += pose[..., 0, None]
-    out[..., 1] += pose[..., 1, None]
-    return out

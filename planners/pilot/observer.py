@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planners.pilot.pose import Sighting
+from srs_opt.geometry import rotate_back
 from srs_opt.measurement.chain import Chain, link_positions, position_jacobian
 from srs_opt.model.state import FORWARD, POSE, SIDEWAYS
 from srs_opt.simulate.integrate import Trajectory
@@ -76,9 +77,9 @@ class Correction:
         pose = motion.pose + self.offset + self.drift * motion.time_s[:, None]
         final = motion.final.copy()
         final[POSE] = pose[-1]
-        c, s = math.cos(pose[-1, 2]), math.sin(pose[-1, 2])
-        final[FORWARD] += c * self.drift[0] + s * self.drift[1]
-        final[SIDEWAYS] += c * self.drift[1] - s * self.drift[0]
+        forward, sideways = rotate_back(pose[-1, 2], self.drift[0], self.drift[1])
+        final[FORWARD] += forward
+        final[SIDEWAYS] += sideways
         return replace(motion, pose=pose, final=final)
 
 

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from planners.drive.friction_ensemble import FADING, FRICTIONS
 from planners.drive.plant import PlantStopped
 from planners.motion.robots import undelayed, with_friction_times
-from planners.motion.table import body_in_room
 from planners.pilot.observer import Latency, correct, straight_pose
 from planners.pilot.pose import Camera, Sighting
 from planners.pilot.protocol import Status
@@ -26,6 +25,7 @@ from planners.plan.certify import clearances
 from planners.search.problem import Problem
 from srs_opt.controller.program import Program, events_of
 from srs_opt.errors import NoAnswerError
+from srs_opt.geometry import points_in_room
 from srs_opt.measurement.chain import chain_of
 from srs_opt.model.state import HEADING
 from srs_opt.orbit.body import integrator
@@ -226,14 +226,14 @@ class PilotedPlant:
         left = motion.time_s > self._clock.now() - begin_s
         corrected = correction.apply(motion)
         at = np.searchsorted(motion.time_s, [self._clock.now() - begin_s]).clip(0, motion.time_s.size - 1)
-        lines = body_in_room(centre_lines(self.run, motion.kappa[at]), corrected.pose[at])
+        lines = points_in_room(centre_lines(self.run, motion.kappa[at]), corrected.pose[at])
         self.body, self.clearance_m = lines[0], float(clearances(self._problem, lines)[0])
         self._shows(self)
         off_m = float(np.hypot(*(corrected.pose - motion.pose)[-1, :2]))
         if off_m > STRAY * self.robot.length_m:
             self._stop(f"strayed by {1e3 * off_m:.0f} mm from the predicted motion", may_go_on=True)
         if left.any():
-            lines = body_in_room(centre_lines(self.run, motion.kappa[left]), corrected.pose[left])
+            lines = points_in_room(centre_lines(self.run, motion.kappa[left]), corrected.pose[left])
             if float(clearances(self._problem, lines).min()) < CONTACT * self.robot.length_m:
                 self._stop("a wall would have been touched within the cycle", may_go_on=True)
 

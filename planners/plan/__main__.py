@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 from srs_opt.command import Answer, Parser, finite_float, make_parser, positive_float, run_command, say
 
 if TYPE_CHECKING:
+    from planners.apps.route import Route
     from planners.drive.execute import Execution
-    from planners.plan.route import Route
 
 COSTS = ("time", "length", "clearance", "air")
 
@@ -134,11 +134,11 @@ def run(options: argparse.Namespace) -> Answer:
     """Plan, certify, explain, drive, draw."""
     from functools import partial
 
+    from planners.apps.route import Route, drive_plan
     from planners.drive.engine_plant import drive_in_engine
     from planners.plan.inputs import problem_from
     from planners.plan.portfolio import PlanRequest, solve
     from planners.plan.registry import planner_named
-    from planners.plan.route import Route, drive_plan
     from planners.refine.refine import check_refinable
     from planners.view.animation_path import check_animation_path
     from srs_opt.figures import save_figure

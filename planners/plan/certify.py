@@ -19,11 +19,11 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from planners.motion.table import body_in_room
 from planners.motion.valves import STAIR_S
 from planners.search.problem import ROUNDING_M, Problem
 from planners.search.tree import Root, arrival_index, at_rest
 from srs_opt.errors import NoAnswerError
+from srs_opt.geometry import points_in_room
 from srs_opt.model.outline import POINTS_PER_ARC
 from srs_opt.simulate.batched import Search, run_batched
 from srs_opt.simulate.integrate import Trajectory
@@ -151,7 +151,7 @@ class Certifier:
         """Return whether a few bodies of a cycle tell that it overlaps a wall, whatever the error is."""
         problem = self.problem
         few = np.linspace(0, cycle.time_s.size - 1, GLANCES).astype(int)
-        lines = body_in_room(centre_lines(problem.integrator, cycle.kappa[few]), cycle.pose[few])
+        lines = points_in_room(centre_lines(problem.integrator, cycle.kappa[few]), cycle.pose[few])
         deepest = float(problem.body.estimate(lines).min()) + problem.field.error_m
         return deepest < -SURE * problem.robot.length_m
 
@@ -175,7 +175,7 @@ class Certifier:
         """Return the certificate, and whether a finer integration would not change it for the better."""
         problem, root = self.problem, self.root
         time, pose, kappa, cycle = _joined(cycles)
-        lines = body_in_room(centre_lines(problem.integrator, kappa), pose)
+        lines = points_in_room(centre_lines(problem.integrator, kappa), pose)
         arrived = arrival_index(problem.goal, pose)
         last = len(time) if arrived is None else arrived + 1
         time, pose, lines, kappa, cycle = time[:last], pose[:last], lines[:last], kappa[:last], cycle[:last]
@@ -224,8 +224,8 @@ class Certifier:
             np.stack([np.interp(at, time, column) for column in columns.T], axis=1)
             for columns in fine_columns
         )
-        here = body_in_room(centre_lines(run, fine_kappa), fine_pose)
-        there = body_in_room(centre_lines(run, kappa), pose)
+        here = points_in_room(centre_lines(run, fine_kappa), fine_pose)
+        there = points_in_room(centre_lines(run, kappa), pose)
         apart = np.hypot(*(here - there).transpose(2, 0, 1)).max(axis=1)
         return at, np.maximum.accumulate(apart) / RATIO
 

@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planners.motion.robots import undelayed
-from planners.motion.table import body_in_room
 from planners.plan.answer import Plan
 from planners.plan.certify import clearances
 from planners.search.problem import Problem
 from planners.search.tree import at_rest
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait_opt.robust import stiffness_interval
+from srs_opt.geometry import compose, distance_along, points_in_room, relative
 from srs_opt.orbit.body import integrator
 from srs_opt.robot import Robot
 from srs_opt.simulate.batched import run_batched
@@ -121,7 +121,7 @@ def _open_loop(problem: Problem, plan: Plan, tolerance: Tolerance) -> tuple[floa
     least_m, until_m = [], []
     for pose, lines, room_m in ways:
         far = np.hypot(*(lines - pose[0, :2]).transpose(2, 0, 1)).max(axis=1)
-        way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(pose[:, :2], axis=0).T))])
+        way = distance_along(pose[:, :2])
         tube = tolerance.position_m + tolerance.heading_rad * far + problem.drive.margin_m(1.0) * way
         left = room_m - tube
         bad = np.flatnonzero(left <= 0)
@@ -142,7 +142,7 @@ def _played(problem: Problem, plan: Plan, robot: Robot) -> tuple[Array, Array, A
         kappa.append(trajectory.kappa[seen])
         state, before, ended_s = trajectory.final, gait, ended_s + trajectory.time_s[-1]
     poses = np.concatenate(pose)
-    lines = body_in_room(centre_lines(run, np.concatenate(kappa)), poses)
+    lines = points_in_room(centre_lines(run, np.concatenate(kappa)), poses)
     return poses, lines, clearances(problem, lines)
 
 
@@ -176,16 +176,14 @@ def _closed_loop(problem: Problem, plan: Plan, tolerance: Tolerance) -> float:
         body = centre_lines(problem.integrator, trajectory.kappa[seen])
         tube = tolerance.position_m + problem.bending.tube_m(pose, problem.motion.row(gait))
         for turn in (-tolerance.heading_rad, 0.0, tolerance.heading_rad):
-            lines = body_in_room(body, _turned(pose, turn))
+            lines = points_in_room(body, _turned(pose, turn))
             least_m = min(least_m, _least(problem, lines, tube))
     return least_m
 
 
 def _turned(pose: Array, turn: float) -> Array:
     """Return poses (n, 3) turned about the first one."""
-    c, s = np.cos(turn), np.sin(turn)
-    dx, dy = pose[:, 0] - pose[0, 0], pose[:, 1] - pose[0, 1]
-    return np.stack([pose[0, 0] + c * dx - s * dy, pose[0, 1] + s * dx + c * dy, pose[:, 2] + turn], axis=1)
+    return compose(pose[0] + [0.0, 0.0, turn], relative(pose[0], pose))
 
 
 def _least(problem: Problem, lines: Array, tube: Array) -> float:

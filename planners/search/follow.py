@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from planners.drive.track import Learned, Reference, Where, choose, nearest_node
 from planners.search.costmap import speed_by_room
 from planners.search.problem import Problem
+from planners.search.track import Learned, Reference, Where, choose, nearest_node
 from planners.search.tree import Step, arrival_index, at_rest
 from srs_opt.model.state import FORWARD, POSE
 

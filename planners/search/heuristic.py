@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from planners.motion.table import body_in_room
 from planners.search.costmap import BLOCKED_S
 from planners.search.problem import Problem
+from srs_opt.geometry import points_in_room
 
 Array = NDArray[np.float64]
 MOST_GAIN = 5.0  # a point of the body may promise at most so many times the time of the way to it
@@ -63,4 +63,4 @@ def _by_place(problem: Problem, end: Array) -> tuple[Array, Array]:
 def motion_lines(problem: Problem, before: int, pose: Array, gaits: NDArray[np.int64] | slice) -> Array:
     """Return thinned centre lines (gaits, samples, points, 2) of a cycle of some gaits after another."""
     body = problem.motion.body[problem.motion.row(before), gaits, 2::2, ::4]
-    return body_in_room(body, pose[gaits, 2::2])
+    return points_in_room(body, pose[gaits, 2::2])

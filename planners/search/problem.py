@@ -16,7 +16,7 @@ from planners.maze.places import Goal, Pose, RobotSize
 from planners.motion.bending import Bending
 from planners.motion.cycles import CycleRun
 from planners.motion.robots import undelayed
-from planners.motion.table import MotionTable, body_in_room
+from planners.motion.table import MotionTable
 from planners.motion.valves import Joints
 from planners.search.clearance import BodyClearance
 from planners.search.cost_model import Cost, CostModel
@@ -25,6 +25,7 @@ from planners.search.heading_map import HeadingMap, heading_map
 from srs_opt.drive.calibration import NO_CALIBRATION, DriveCalibration
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait_opt.table import GaitTable
+from srs_opt.geometry import points_in_room
 from srs_opt.orbit.body import integrator
 from srs_opt.robot import Robot
 from srs_opt.simulate.batched import run_batched
@@ -246,7 +247,7 @@ class Problem:
         lines = centre_lines(self.integrator, curved.reshape(-1, curved.shape[-1]))
         share = np.linspace(0.0, 1.0, samples.shape[1])
         pose = np.stack([self.bending.placed(p, b, g, share) for (b, g, _), p in zip(went, samples[..., :3])])
-        placed = body_in_room(lines.reshape(*curved.shape[:-1], *lines.shape[1:]), pose)
+        placed = points_in_room(lines.reshape(*curved.shape[:-1], *lines.shape[1:]), pose)
         cycles = []
         for (_, gait, (last, _)), poses, body in zip(went, pose, placed):
             state = last if self.bending.none else np.concatenate([poses[-1], last[3:]])

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from srs_opt.geometry import rotation_matrix
+
 ROUNDS = 8
 SETTLED_S = 1e-7
 DIFFERENCE_S = 1e-3  # for the velocity of the points; its error shrinks with the residual
@@ -37,8 +39,7 @@ class Alignment:
     @property
     def matrix(self) -> np.ndarray:
         """Return the rotation (2, 2)."""
-        c, s = np.cos(self.turn_rad), np.sin(self.turn_rad)
-        return np.array([[c, -s], [s, c]])
+        return rotation_matrix(self.turn_rad)
 
     def points(self, points: np.ndarray) -> np.ndarray:
         """Return x1, y1, x2, ... (T, 2 M) where they lie."""

@@ -12,7 +12,7 @@ import numpy as np
 from srs_opt.calibrate.coordinates import Coordinate, base_coordinates
 from srs_opt.calibrate.fit import Fit
 from srs_opt.calibrate.forms import Form, form_of_entry, forms_of
-from srs_opt.model.effects import all_effects
+from srs_opt.effects import all_effects
 from srs_opt.robot import Robot
 
 

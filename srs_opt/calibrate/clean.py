@@ -9,9 +9,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from srs_opt.calibrate.noise import MAD, track_of
+from srs_opt.calibrate.noise import track_of
 from srs_opt.measurement.chain import chain_of
 from srs_opt.measurement.labels import mend_labels
+from srs_opt.measurement.noise import MAD
 from srs_opt.measurement.records import Array, DataSet, Trial
 from srs_opt.robot import Robot
 

@@ -16,8 +16,8 @@ from typing import Any
 import casadi as ca
 
 from srs_opt.calibrate.coordinates import INFINITY, Coordinate
-from srs_opt.model.effects.effect import Effect
-from srs_opt.model.effects.parameter import Direction, EffectParameter, Place, Scale, Towards
+from srs_opt.effects.effect import Effect
+from srs_opt.effects.parameter import Direction, EffectParameter, Place, Scale, Towards
 
 LOG_TYPICAL = 0.3  # change of a logarithm that begins to matter
 
@@ -171,7 +171,7 @@ def forms_of(effect: Effect, links: int) -> tuple[Form, ...]:
 
 def form_of_entry(entry: Mapping[str, Any]) -> Form:
     """Return the form of a robot file's entry."""
-    from srs_opt.model.effects import known_effects
+    from srs_opt.effects import known_effects
 
     effect = known_effects()[entry["name"]]
     return Form(effect, int(entry[effect.place.name]) if effect.place else None)

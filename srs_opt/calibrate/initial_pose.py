@@ -7,6 +7,7 @@ from functools import lru_cache
 import casadi as ca
 import numpy as np
 
+from srs_opt.geometry import turn_by
 from srs_opt.model.parameters import Structure
 from srs_opt.model.registry import build
 
@@ -16,8 +17,8 @@ def _initial_pose_function(structure: Structure) -> ca.Function:
     parameters, m, _ = build(structure)
     heading = ca.SX.sym("heading")
     x, y = (ca.substitute(v[0], m.shape, ca.SX.zeros(m.shape.shape)) for v in (m.chain.x, m.chain.y))
-    c, s = ca.cos(heading), ca.sin(heading)
-    pose = ca.vertcat(-(c * x - s * y), -(s * x + c * y), heading)
+    x, y = turn_by(ca.cos(heading), ca.sin(heading), x, y)
+    pose = ca.vertcat(-x, -y, heading)
     p = parameters.vector
     return ca.Function("start", [p, heading], [pose, ca.jacobian(pose, p)])
 

@@ -13,10 +13,10 @@ import numpy as np
 from srs_opt.calibrate.coordinates import SCATTER_SD, Coordinate
 from srs_opt.calibrate.model import Conditions, Model, Values
 from srs_opt.calibrate.normal_equations import NormalEquations
+from srs_opt.effects import known_effects
+from srs_opt.effects.effect import LinkState
 from srs_opt.measurement.records import Bench, Check, TowTest
 from srs_opt.model.compliant import CompliantModel
-from srs_opt.model.effects import known_effects
-from srs_opt.model.effects.effect import LinkState
 from srs_opt.model.mechanics import Mechanics
 from srs_opt.model.parameters import Structure, effect_symbols
 from srs_opt.model.registry import build

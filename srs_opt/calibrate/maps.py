@@ -16,10 +16,10 @@ from srs_opt.calibrate.model import Model
 from srs_opt.calibrate.normal_equations import NormalEquations, solve
 from srs_opt.calibrate.objective import priors, sum_eliminated
 from srs_opt.calibrate.result import Calibration, calibration
+from srs_opt.effects import known_effects
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Wave
 from srs_opt.measurement.records import DataSet, MapRow, Trial
-from srs_opt.model.effects import known_effects
 from srs_opt.orbit.body import integrator
 from srs_opt.orbit.sensitivity import sensitivity
 from srs_opt.orbit.steady import Orbit, steady_gaits

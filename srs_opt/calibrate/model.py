@@ -15,8 +15,8 @@ import numpy as np
 
 from srs_opt.calibrate.coordinates import Coordinate
 from srs_opt.calibrate.forms import Form, form_of_entry, forms_of
-from srs_opt.model.effects import all_effects, generic_effects, known_effects
-from srs_opt.model.effects.effect import OUTSIDE, Effect
+from srs_opt.effects import all_effects, generic_effects, known_effects
+from srs_opt.effects.effect import OUTSIDE, Effect
 from srs_opt.model.parameters import COMPLIANCE_PARAMETERS, Structure, effect_symbols
 from srs_opt.model.registry import build
 from srs_opt.robot import Robot
@@ -79,7 +79,7 @@ class Model:
     model : {"complex", "simplified", "compliant"}, optional
         Default: what the robot file asks for. Under a rigid one a stiffness of the robot does not count.
     generic : bool
-        Whether effects are those of the grammar (`srs_opt.model.effects.generic`), not the listed ones.
+        Whether effects are those of the grammar (`srs_opt.effects.generic`), not the listed ones.
 
     Attributes
     ----------

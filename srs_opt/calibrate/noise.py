@@ -10,11 +10,11 @@ from math import comb
 
 import numpy as np
 
+from srs_opt.measurement.noise import MAD
 from srs_opt.measurement.records import DataSet, Trial
 
 ORDER = 4
 _LEAST = 50  # differences that an estimate needs
-MAD = 0.674489750196  # median |x| of a unit normal
 _WILD = 5.0  # robust standard deviations beyond which a difference is a jump, not noise
 
 

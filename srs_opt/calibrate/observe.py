@@ -14,10 +14,11 @@ from srs_opt.calibrate.mapped import evaluate, mapped
 from srs_opt.calibrate.model import Model, Values
 from srs_opt.calibrate.sensitivity import Variation, onset, variation
 from srs_opt.calibrate.trial_simulation import Nodes, conditions_of
+from srs_opt.effects import known_effects
+from srs_opt.effects.effect import Effect
+from srs_opt.geometry import turn_by
 from srs_opt.measurement.records import Trial
 from srs_opt.measurement.spots import Spots
-from srs_opt.model.effects import known_effects
-from srs_opt.model.effects.effect import Effect
 from srs_opt.model.kinematics import Chain, arc
 from srs_opt.model.mechanics import Mechanics
 from srs_opt.model.parameters import Structure, effect_symbols
@@ -66,8 +67,8 @@ def _picture(
         camera = ca.vertcat(*(v for own in values.values() for v in own.values()))
         c, s = ca.cos(pose[2]), ca.sin(pose[2])
         body = _body_points(m, spots)
-        x = pose[0] + c * body.x - s * body.y
-        y = pose[1] + s * body.x + c * body.y
+        dx, dy = turn_by(c, s, body.x, body.y)
+        x, y = pose[0] + dx, pose[1] + dy
         x, y = _seen(x, y, pose[2] + body.angle, effects, values, m.mass if centre_only else None)
         points = ca.vec(ca.horzcat(x, y).T)
         p = parameters.vector

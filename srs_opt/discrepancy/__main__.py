@@ -129,10 +129,9 @@ def _maze(options: argparse.Namespace, robot: Robot) -> Maze | None:
     """Return the maze of --maze, looked at before anything slow."""
     if options.maze is None:
         return None
-    from planners.plan.inputs import placed_maze
-    from planners.plan.options import MARGIN_M
+    from planners.apps.payoff import payoff_maze
 
-    return placed_maze(robot, options.maze, MARGIN_M)
+    return payoff_maze(robot, options.maze)
 
 
 def _payoff(
@@ -151,8 +150,8 @@ def _payoff(
     record = gains.to_record() | {"words": gains.in_words()}
     if maze is None:
         return record, f"\n{gains.in_words()}", []
-    from planners.plan.payoff import maze_payoff
-    from planners.view.payoff_picture import payoff_figure
+    from planners.apps.payoff import maze_payoff
+    from planners.apps.payoff_picture import payoff_figure
 
     sides = (gains.calibrated, gains.promised.gait), (gains.corrected, gains.after.gait)
     runs = maze_payoff(*sides, maze, options.model, tell)
@@ -168,7 +167,7 @@ def _payoff(
 def _effect_names(path: Path) -> list[str]:
     """Read the names to consider: a list, or a mapping with the key `effects`."""
     from srs_opt.document import read_yaml, unknown_word
-    from srs_opt.model.effects import all_effects
+    from srs_opt.effects import all_effects
 
     document = read_yaml(path, "a list of effect names (YAML)")
     value = document.value.get("effects") if isinstance(document.value, dict) else document.value

@@ -23,9 +23,9 @@ from srs_opt.discrepancy.hypothesis import Hypothesis
 from srs_opt.discrepancy.screen import Linearisation, Score, expected_start, screen
 from srs_opt.discrepancy.seal import Gap, open_seal
 from srs_opt.discrepancy.search import Search
+from srs_opt.effects import generic_effects
+from srs_opt.effects.generic import TERMS, Term
 from srs_opt.measurement.records import Trial
-from srs_opt.model.effects import generic_effects
-from srs_opt.model.effects.generic import TERMS, Term
 
 
 @dataclass(frozen=True)

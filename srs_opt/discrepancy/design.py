@@ -64,7 +64,7 @@ def rivals_of(selection: Selection, fitted: Sequence[Hypothesis], null: Hypothes
     The stories are the best fits that put the fault into different stages of the model, so that the answer
     says where to look; where there is one only, that nothing is missing is the other.
     """
-    from srs_opt.model.effects import known_effects
+    from srs_opt.effects import known_effects
 
     found = [selection.best, *selection.rivals]
     if len(found) > 1:
@@ -116,7 +116,7 @@ def repeat_of(trial: str, gain: float, other: str) -> NextExperiment:
 
 def _own_instruments(a: Hypothesis, b: Hypothesis) -> list[str]:
     """Return the quantities that measure directly an effect that one of two hypotheses holds."""
-    from srs_opt.model.effects import known_effects
+    from srs_opt.effects import known_effects
 
     asked = (known_effects()[name].instrument for name in {*a.names} ^ {*b.names})
     return sorted({q for q in asked if q in INSTRUMENTS})

@@ -32,9 +32,9 @@ from srs_opt.discrepancy.settings import SETTINGS, Settings
 from srs_opt.discrepancy.split import Split, few_and_brief, split_trials
 from srs_opt.discrepancy.verdict import BELIEVED, DESCRIBED, NO_GAP, NOT_TESTABLE, UNKNOWN, Verdict, judge
 from srs_opt.discrepancy.visible import Visible, visible
+from srs_opt.effects.generic import TERMS
 from srs_opt.errors import NoAnswerError
 from srs_opt.measurement.records import DataSet
-from srs_opt.model.effects.generic import TERMS
 from srs_opt.parallel import HERE, Executor
 from srs_opt.result import Result
 

@@ -21,9 +21,9 @@ from srs_opt.discrepancy.verdict import (
     UNKNOWN,
 )
 from srs_opt.discrepancy.words import in_words
+from srs_opt.effects import known_effects
 from srs_opt.figures import Picture
 from srs_opt.files import write_text
-from srs_opt.model.effects import known_effects
 
 HEADLINES = {
     NO_GAP: "No gap: the calibrated model explains these data",

@@ -15,6 +15,7 @@ import numpy as np
 from srs_opt.document import read_yaml
 from srs_opt.errors import InputError
 from srs_opt.files import write_json
+from srs_opt.geometry import rotate
 
 
 @dataclass(frozen=True)
@@ -65,8 +66,8 @@ class DriveCalibration:
             else self.speed.value
         )
         bend = (new_turn - turn) / 2  # the chord lies half the turn away from the heading
-        c, s = math.cos(bend), math.sin(bend)
-        return np.array([chord * (c * dx - s * dy), chord * (s * dx + c * dy), new_turn])
+        x, y = rotate(bend, dx, dy)
+        return np.array([chord * x, chord * y, new_turn])
 
     def margin_m(self, distance_m: float, sigmas: float = 2.0) -> float:
         """Return the clearance that uncertain speed and radius cost over `distance_m` between corrections."""

@@ -305,8 +305,7 @@ def _run_table(options: argparse.Namespace) -> Answer:
     import time
     from functools import partial
 
-    from planners.motion.changes import with_changes
-    from planners.motion.valves import ValveLimits
+    from planners.apps.table_changes import with_changes
     from srs_opt.controller.c_source import write_changes, write_program
     from srs_opt.controller.program import Program
     from srs_opt.figures import save_figure
@@ -344,8 +343,8 @@ def _run_table(options: argparse.Namespace) -> Answer:
         kept = len(list(unfinished.glob("*.json")))
         say(options, f"\n{kept} optimizations are kept in {unfinished}; the same command goes on from there")
         raise
-    valves = ValveLimits(options.min_dwell, options.tick)
-    table = with_changes(robot, table, valves, lambda rows: progress(rows, options, "changes of gait"))
+    tell = partial(progress, options=options, what="changes of gait")
+    table = with_changes(robot, table, min_dwell_s=options.min_dwell, tick_s=options.tick, progress=tell)
     seconds = time.perf_counter() - begun
     program = Program.of_table(table, options.tick)
     files = [

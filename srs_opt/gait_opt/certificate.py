@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from srs_opt.effects import known_effects
 from srs_opt.gait import Gait
 from srs_opt.gait_opt.collocation.problem import CycleProblem
 from srs_opt.gait_opt.goal import (
@@ -18,7 +19,6 @@ from srs_opt.gait_opt.goal import (
     Limits,
 )
 from srs_opt.gait_opt.score import broken_constraints, evaluated, robot_scores
-from srs_opt.model.effects import known_effects
 from srs_opt.orbit.attractors import other_orbits
 from srs_opt.orbit.body import body_over_cycle, integrator
 from srs_opt.orbit.steady import Orbit, steady_gait

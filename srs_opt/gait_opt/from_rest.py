@@ -10,9 +10,9 @@ Source: N. Hansen, The CMA Evolution Strategy: A Tutorial, arXiv:1604.00772.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,7 @@ from srs_opt.gait_opt.certificate import STANDING_START, standing_start
 from srs_opt.gait_opt.collocation.problem import CycleProblem
 from srs_opt.gait_opt.continuation import Step, orbits_of
 from srs_opt.gait_opt.corrections import on_ticks
+from srs_opt.gait_opt.evolution import evolution
 from srs_opt.gait_opt.population import Coordinates, simulated_costs
 
 MISLED = 0.05  # collocation against simulation from rest: beyond, the collocated orbit was another one
@@ -69,27 +70,25 @@ def misled(steps: Sequence[Step]) -> bool:
 
 def search_from_rest(problem: CycleProblem, gait: Gait, seed: int = 0) -> FromRest:
     """Return the best gait that CMA-ES finds about `gait`, which has one on-interval per segment."""
-    import cma
-
-    random, at = np.random.default_rng(seed), Coordinates(problem)
+    at = Coordinates(problem)
     start = at.of(gait)
     spread = np.where(np.arange(start.size) < 2, SPREAD_LIMITS, SPREAD_CYCLES)
     before = -simulated_costs(problem, [gait])[0]
     best, after, count = gait, before, 1
-    options = {
-        "CMA_stds": spread, "popsize": MEMBERS, "maxiter": GENERATIONS, "tolfun": _SETTLED, "verbose": -9,
-        "randn": lambda *shape: random.standard_normal(shape), "seed": math.nan,
-    }  # fmt: skip
-    strategy = cma.CMAEvolutionStrategy(start, 1.0, options)
+    limits = problem.limits
+    generations = evolution(
+        lambda genes: [on_ticks(at.gait(x), limits.tick_s, limits.frequency_hz) for x in genes],
+        partial(simulated_costs, problem),
+        start,
+        spread,
+        seed=np.random.default_rng(seed),
+        popsize=MEMBERS,
+        maxiter=GENERATIONS,
+        tolfun=_SETTLED,
+    )
     try:
-        while not strategy.stop():
-            members = strategy.ask()
-            gaits = [
-                on_ticks(at.gait(x), problem.limits.tick_s, problem.limits.frequency_hz) for x in members
-            ]
-            costs = simulated_costs(problem, gaits)
+        for gaits, costs in generations:
             count += len(gaits)
-            strategy.tell(members, costs)
             for k in np.argsort(costs):
                 if -costs[k] <= after:
                     break

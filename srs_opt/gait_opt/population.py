@@ -19,6 +19,7 @@ from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait
 from srs_opt.gait_opt.collocation.guess import gait_of, switches_of
 from srs_opt.gait_opt.collocation.problem import CycleProblem
+from srs_opt.gait_opt.evolution import evolution
 from srs_opt.gait_opt.score import score
 from srs_opt.gait_opt.starts import starting_gaits
 from srs_opt.orbit.steady import Orbit, steady_gaits
@@ -126,17 +127,19 @@ def evolved(problem: CycleProblem, start: Gait, seed: int, evaluations: int) -> 
     evaluations : int
         Gaits to be simulated, at most; fewer where the population comes to rest.
     """
-    import cma
-
     at = Coordinates(problem)
-    options = {"seed": seed + 1, "popsize": SIZE, "maxfevals": evaluations, "tolfun": _DONE, "verbose": -9}
-    strategy = cma.CMAEvolutionStrategy(at.of(start), _SPREAD, options)
     best, least = start, simulated_costs(problem, [start])[0]
-    while not strategy.stop():
-        asked = strategy.ask()
-        gaits = [at.gait(x) for x in asked]
-        costs = simulated_costs(problem, gaits)
-        strategy.tell(asked, costs)
+    generations = evolution(
+        lambda genes: [at.gait(x) for x in genes],
+        partial(simulated_costs, problem),
+        at.of(start),
+        _SPREAD,
+        seed=seed + 1,
+        popsize=SIZE,
+        maxfevals=evaluations,
+        tolfun=_DONE,
+    )
+    for gaits, costs in generations:
         k = int(np.argmin(costs))
         if costs[k] < least:
             best, least = gaits[k], costs[k]

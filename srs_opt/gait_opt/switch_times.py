@@ -18,8 +18,8 @@ from srs_opt.gait_opt.collocation.refine import defects, refined_cuts
 from srs_opt.gait_opt.continuation import Report, Stage, Step, bounded, elements_until, orbits_of
 from srs_opt.gait_opt.prices import Price, prices
 from srs_opt.gait_opt.score import Score, score
-from srs_opt.orbit.motion import STRAIGHT_RADIUS_M
 from srs_opt.orbit.steady import Orbit
+from srs_opt.simulate.cycle_motion import STRAIGHT_RADIUS_M
 
 # the start is near: let the barrier begin low and push nothing off its limits
 _IPOPT = {

@@ -14,8 +14,8 @@ from dart_snake.bending import Lags, respond
 from dart_snake.engine import STEP_S, Snake
 from srs_opt.gait import Gait
 from srs_opt.judge.bodies import body_of, drive_of, pull_of
-from srs_opt.orbit.motion import CycleMotion, cycle_motion
 from srs_opt.robot import Robot
+from srs_opt.simulate.cycle_motion import CycleMotion, cycle_motion
 
 Array = NDArray[np.float64]
 SAMPLES = 48  # rows per cycle

@@ -13,11 +13,11 @@ from dart_snake.engine import Snake
 from srs_opt.document import read_json
 from srs_opt.errors import InputError
 from srs_opt.gait import Gait, check_gait
+from srs_opt.geometry import rotate
 from srs_opt.judge.bodies import body_of, pull_of
 from srs_opt.judge.gaits import DEFAULT_SETTINGS, Settings
 from srs_opt.judge.replay import Drift, Phases, length_m, play_blind, whole_step_s
 from srs_opt.orbit.body import integrator
-from srs_opt.orbit.motion import rotate
 from srs_opt.robot import Robot
 from srs_opt.simulate.timeline import Timeline
 from srs_opt.simulate.valve_file import read_valves

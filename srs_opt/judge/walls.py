@@ -12,6 +12,7 @@ import shapely
 from numpy.typing import NDArray
 
 from dart_snake.walls import WallBox, wall_boxes
+from srs_opt.geometry import rotation_matrix
 
 FRAME_M = 0.05  # of the wall around the bounds
 
@@ -70,5 +71,5 @@ def _cells(cells: Mapping[str, Any]) -> list[Any]:
     if not runs:
         return []
     region = shapely.union_all(shapely.box(*np.array(runs).T))
-    c, s = np.cos(heading), np.sin(heading)
-    return [shapely.transform(region, lambda p: p @ np.array([[c, s], [-s, c]]) + [x0, y0])]
+    turn = rotation_matrix(heading)
+    return [shapely.transform(region, lambda p: p @ turn.T + [x0, y0])]

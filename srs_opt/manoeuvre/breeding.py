@@ -11,12 +11,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
+from srs_opt.gait_opt.evolution import evolution
 from srs_opt.manoeuvre.shooting import shoot
 from srs_opt.manoeuvre.solve import Candidate, Solver
-from srs_opt.manoeuvre.starts import FREQUENCY_HZ, LAG_RAD, arrived, passed, with_end
+from srs_opt.manoeuvre.starts import FREQUENCY_HZ, LAG_RAD, arrived, passed, random_pressure_kpa, with_end
 from srs_opt.manoeuvre.task import Task
 from srs_opt.manoeuvre.valves import ValvePlan, ValveRow
 
@@ -59,8 +61,7 @@ class Family:
         """Return the genes of a random steady wave."""
         frequency, lag = rng.uniform(*FREQUENCY_HZ), rng.choice((-1, 1)) * rng.uniform(*LAG_RAD)
         offset = rng.uniform(-0.95, 0.95) * rng.integers(2)
-        low, high = self.task.bounds.pressure_kpa
-        pressure = high - (high - low) * 0.4 * rng.uniform() ** 2
+        pressure = random_pressure_kpa(self.task, rng)
         time = 0.0 if passed(self.task) else math.log(rng.uniform(0.3, 1.2))
         phase = rng.uniform(0, 2 * math.pi)
         return np.array([*[frequency] * KNOTS, phase, lag, lag, offset, offset, pressure, time])
@@ -95,8 +96,6 @@ def bred(solver: Solver, begun: Candidate, seed: int) -> Candidate:
     begun : Candidate
         The best steady wave; its duration says how much time the task takes.
     """
-    import cma
-
     task = solver.task
     played = begun.plan.duration_s * (LONGER if passed(task) else 1.0)
     family = Family(task, solver.run.structure.segments, min(played, task.longest_s or math.inf))
@@ -104,15 +103,18 @@ def bred(solver: Solver, begun: Candidate, seed: int) -> Candidate:
     first = [family.steady(rng) for _ in range(FIRST * SIZE)]
     judged = _judged(solver, family, first)
     middle = first[min(range(len(first)), key=lambda k: judged[k].merit)]
-    options = {"CMA_stds": family.spread, "popsize": SIZE, "maxiter": GENERATIONS, "seed": seed + 1}
-    strategy = cma.CMAEvolutionStrategy(middle, 1.0, {**options, "verbose": -9})
     best = min(judged, key=lambda c: c.merit)
-    while not strategy.stop():
-        asked = strategy.ask()
-        judged = _judged(solver, family, asked)
-        # a motion that cannot be integrated ranks last
-        strategy.tell(asked, [min(c.merit, 1e6) for c in judged])
-        best = min([best, *judged], key=lambda c: c.merit)
+    generations = evolution(
+        partial(_judged, solver, family),
+        lambda candidates: [c.merit for c in candidates],
+        middle,
+        family.spread,
+        seed=seed + 1,
+        popsize=SIZE,
+        maxiter=GENERATIONS,
+    )
+    for candidates, _ in generations:
+        best = min([best, *candidates], key=lambda c: c.merit)
     return best
 
 

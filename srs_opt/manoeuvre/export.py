@@ -11,9 +11,9 @@ from srs_opt.controller.program import ControllerLimits, Program, ProgramGait, e
 from srs_opt.figures import COLOURS, LEFT, PAGE_IN, RIGHT, draw_body, new_figure, save_figure, styled
 from srs_opt.gait_opt.goal import chamber_volume_m3
 from srs_opt.gait_opt.ticks import Schedule
+from srs_opt.geometry import points_in_room
 from srs_opt.manoeuvre.search import Manoeuvre
 from srs_opt.manoeuvre.task import Task
-from srs_opt.orbit.motion import rotate
 from srs_opt.robot import Robot
 from srs_opt.simulate.integrate import Integrator, Trajectory
 from srs_opt.simulate.shapes import centre_lines
@@ -57,8 +57,7 @@ def bodies(run: Integrator, path: Trajectory, times_s: np.ndarray) -> np.ndarray
     """Return the centre lines (n, points, 2) in the room at some instants."""
     pose, kappa = path.at(times_s)
     line = centre_lines(run, kappa)
-    x, y = rotate(pose[:, 2, None], line[..., 0], line[..., 1])
-    return np.stack([x + pose[:, 0, None], y + pose[:, 1, None]], axis=-1)
+    return points_in_room(line, pose)
 
 
 def program_of(robot: Robot, task: Task, found: Manoeuvre) -> Program:

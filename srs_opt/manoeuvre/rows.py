@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from srs_opt.geometry import points_in_room, rotate
 from srs_opt.manoeuvre.shooting import Shot
 from srs_opt.manoeuvre.task import (
     GAIT_CURVATURE_SHARE,
@@ -16,8 +17,7 @@ from srs_opt.manoeuvre.task import (
     REST_SPEED_M_S,
     Task,
 )
-from srs_opt.model.state import PLACE, POSE
-from srs_opt.orbit.motion import rotate
+from srs_opt.model.state import HEADING, PLACE, POSE
 from srs_opt.simulate.integrate import Integrator
 from srs_opt.simulate.shapes import centre_lines
 
@@ -193,14 +193,14 @@ def body_points(
     moved : array (n, nx, m) or None
         Their slopes, where those of the lines are asked for.
     """
-    kappa, (x, y, heading) = states[:, run.layout.kappa], states[:, POSE].T
+    kappa, heading = states[:, run.layout.kappa], states[:, HEADING]
     line = centre_lines(run, kappa)
-    bx, by = rotate(heading[:, None], line[..., 0], line[..., 1])
-    points = np.stack([x[:, None] + bx, y[:, None] + by], axis=-1)
+    points = points_in_room(line, states[:, POSE])
     if moved is None:
         return points, None
     slopes = np.repeat(moved[:, None, :2], line.shape[1], axis=1)
-    turned = np.stack([-by, bx], axis=-1)
+    arm = points - states[:, None, PLACE]
+    turned = np.stack([-arm[..., 1], arm[..., 0]], axis=-1)
     slopes = slopes + turned[..., None] * moved[:, None, None, 2]
     for k in range(kappa.shape[1]):
         hair = np.zeros(kappa.shape[1])

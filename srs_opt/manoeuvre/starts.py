@@ -23,6 +23,7 @@ from srs_opt.orbit.steady import Orbit
 PLANS = 960  # simulated at most, several lengths of time per wave where the end is not merely passed
 WAVES = 30  # per start that is wanted
 FREQUENCY_HZ, LAG_RAD = (1.2, 4.5), (0.6, 1.6)
+PRESSURE_SPAN = 0.4  # share of the limits' width that random pressures take; below it waves are slow
 TIMES = 6  # lengths tried per wave
 FIRST_S = 0.25
 VENT_S = 0.45  # of a stop's first draft
@@ -47,7 +48,7 @@ def starts(solver: Solver, gaits: Sequence[Gait], count: int, seed: int) -> list
     backwards = task.end.past_m is not None and task.end.past_m < 0
     for _ in range(waves):
         frequency, lag, phase = rng.uniform(*FREQUENCY_HZ), rng.uniform(*LAG_RAD), rng.uniform(0, 2 * math.pi)
-        pressure = task.pressure_kpa or high - (high - low) * 0.4 * rng.uniform() ** 2
+        pressure = task.pressure_kpa or random_pressure_kpa(task, rng)
         offset = (
             0.0 if not turning else rng.uniform(0.0, 0.95) * np.sign(task.end.turn_rad or rng.uniform(-1, 1))
         )
@@ -67,6 +68,12 @@ def starts(solver: Solver, gaits: Sequence[Gait], count: int, seed: int) -> list
         if all(abs(candidate.merit - k.merit) > ALIKE * abs(k.merit) for k in kept):
             kept.append(candidate)
     return kept
+
+
+def random_pressure_kpa(task: Task, rng: np.random.Generator) -> float:
+    """Return a pressure for a wave, most often near the highest: what bends more is mostly faster."""
+    low, high = task.bounds.pressure_kpa
+    return float(high - (high - low) * PRESSURE_SPAN * rng.uniform() ** 2)
 
 
 def passed(task: Task) -> bool:

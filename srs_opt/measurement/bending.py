@@ -19,11 +19,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from srs_opt.effects import known_effects
 from srs_opt.errors import NoAnswerError
 from srs_opt.measurement.actuator_bench import ActuatorBench, combine_steps
 from srs_opt.measurement.records import Array, StepTest
-from srs_opt.measurement.steps import StepFit, fit_steps, step_response
-from srs_opt.model.effects import known_effects
+from srs_opt.measurement.steps import StepFit, fit_steps
+from srs_opt.model.actuator_law import step_response
 from srs_opt.robot import Robot
 from srs_opt.simulate.batched import run_batched
 from srs_opt.simulate.integrate import Integrator

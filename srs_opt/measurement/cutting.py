@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from srs_opt.errors import InputError
+from srs_opt.geometry import rotation_matrix, wrapped
 from srs_opt.measurement.chain import Chain
 from srs_opt.measurement.onset import Gait, Onset
 from srs_opt.measurement.records import Array, Trial
@@ -70,8 +71,7 @@ def _resting_pose(chain: Chain, ends: Array) -> tuple[Array, float]:
     straight = chain.straight_m[[0, -1]]
     along, own = ends[1] - ends[0], straight[1] - straight[0]
     heading = math.atan2(along[1], along[0]) - math.atan2(own[1], own[0])
-    c, s = math.cos(heading), math.sin(heading)
-    return ends[0] - np.array([[c, -s], [s, c]]) @ straight[0], math.remainder(heading, 2 * math.pi)
+    return ends[0] - rotation_matrix(heading) @ straight[0], math.remainder(heading, 2 * math.pi)
 
 
 def check_rest(trial: Trial, warnings: list[str]) -> None:
@@ -81,7 +81,7 @@ def check_rest(trial: Trial, warnings: list[str]) -> None:
         return
     chords = np.diff(points[:3], axis=1)
     angle = np.arctan2(chords[..., 1], chords[..., 0])
-    bends = np.abs(np.mod(np.diff(angle, axis=1) + np.pi, 2 * np.pi) - np.pi)
+    bends = np.abs(wrapped(np.diff(angle, axis=1)))
     if np.isfinite(bends).any() and float(np.nanmax(bends)) > MOST_BENT_RAD:
         warnings.append(
             f"the robot is bent by {np.nanmax(bends):.2g} rad at the valves' start: the fits "

@@ -11,7 +11,8 @@ from srs_opt.figures import COLOURS, new_figure, styled
 from srs_opt.measurement.circle import Circle
 from srs_opt.measurement.records import Array, StepTest, Trial
 from srs_opt.measurement.smooth import SmoothShape
-from srs_opt.measurement.steps import StepFit, step_response
+from srs_opt.measurement.steps import StepFit
+from srs_opt.model.actuator_law import step_response
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

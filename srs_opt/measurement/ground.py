@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from srs_opt.errors import InputError
+from srs_opt.measurement.noise import MAD
 from srs_opt.measurement.records import Array
 
 SNAP_DEG = 5.0
@@ -64,7 +65,7 @@ def _thinnest(points: Array) -> Array:
 
 def _spread(values: Array) -> float:
     """Return a standard deviation that a few outliers do not move."""
-    return float(1.4826 * np.median(np.abs(values - np.median(values))))
+    return float(np.median(np.abs(values - np.median(values))) / MAD)
 
 
 def without_ghosts(points_m: Array, up: Array, reach_m: float) -> Array:

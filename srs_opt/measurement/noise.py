@@ -8,7 +8,7 @@ import numpy as np
 
 from srs_opt.measurement.records import Array
 
-_NORMAL_MAD = 0.6745  # median of |x| over the standard deviation of a normal distribution
+MAD = 0.674489750196  # median of |x| over the standard deviation of a normal distribution
 
 
 def noise_sd(points_m: Array, fewest: int = 1) -> float:
@@ -19,4 +19,4 @@ def noise_sd(points_m: Array, fewest: int = 1) -> float:
     """
     third = np.diff(points_m.reshape(len(points_m), -1), n=3, axis=0)
     third = third[np.isfinite(third)]
-    return 0.0 if len(third) < fewest else float(np.median(np.abs(third)) / _NORMAL_MAD / math.sqrt(20))
+    return 0.0 if len(third) < fewest else float(np.median(np.abs(third)) / MAD / math.sqrt(20))

@@ -12,7 +12,7 @@ from srs_opt.measurement.chain import Chain, chain_of, marker_positions
 from srs_opt.measurement.noise import noise_sd
 from srs_opt.measurement.records import Array, Schedule
 from srs_opt.measurement.spots import Spots
-from srs_opt.measurement.steps import step_response
+from srs_opt.model.actuator_law import step_response
 from srs_opt.robot import Robot
 
 THRESHOLD = 6.0

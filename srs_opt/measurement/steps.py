@@ -14,6 +14,7 @@ import numpy as np
 
 from srs_opt.errors import InputError, NoAnswerError
 from srs_opt.measurement.records import Array, StepTest
+from srs_opt.model.actuator_law import step_response
 
 LARGEST_Q = 0.999
 GRID = 150
@@ -69,26 +70,6 @@ class StepFit:
     residual_sd_1_m: float
     autocorrelation: float
     samples: int
-
-
-def step_response(time_s: Array, s: float, q: float) -> Array:
-    """Return the unit response of (14) from rest: 1 - e^{-at} (cosh dt + a sinh(dt)/d), d^2 = a^2 q.
-
-    With a = 1/(s (1-q)); defined for q < 1, negative q (a pair of complex roots) included.
-    """
-    t = np.maximum(np.asarray(time_s, dtype=float), 0.0)
-    a = 1 / (s * (1 - q))
-    x = a * a * q * t * t
-    root = np.sqrt(np.abs(x))
-    if q >= 0:
-        slow, fast = np.exp(root - a * t), np.exp(-root - a * t)
-        even, odd = (slow + fast) / 2, (slow - fast) / 2
-    else:
-        even, odd = np.exp(-a * t) * np.cos(root), np.exp(-a * t) * np.sin(root)
-    near = np.abs(x) < 1e-4
-    series = np.exp(-a * t) * (1 + x / 6 * (1 + x / 20))
-    odd = np.where(near, series, odd / np.where(near, 1.0, root))
-    return np.asarray(1 - even - a * t * odd)
 
 
 def fit_step(test: StepTest, *, fit_delay: bool = False) -> StepFit:

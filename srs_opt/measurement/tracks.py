@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from srs_opt.geometry import rotation_matrix
 from srs_opt.measurement.chain import Chain, chain_of
 from srs_opt.measurement.noise import noise_sd
 from srs_opt.measurement.plausible import factor_of_thousand
@@ -215,8 +216,7 @@ def _check_start(trial: Trial, track: Track, chain: Chain, length_m: float, repo
     heading = math.atan2(along[1], along[0]) - math.atan2(straight[1], straight[0])
     gap = math.remainder(heading - trial.heading_rad, 2 * math.pi)
     degrees = math.remainder(heading - math.radians(trial.heading_rad), 2 * math.pi)
-    c, s = math.cos(heading), math.sin(heading)
-    start = start - np.array([[c, -s], [s, c]]) @ chain.straight_m[0]
+    start = start - rotation_matrix(heading) @ chain.straight_m[0]
     if abs(gap) > 2.9 and abs(degrees) > 0.2:
         report.error(track.file, track.lines[0], "the markers run head to tail, expected tail to head")
     elif abs(gap) > 0.2:

@@ -1,8 +1,7 @@
-"""The pneumatic segments: valve state to curvature, the paper's (14)-(15).
+"""The pneumatic segments of a structure: valve state to curvature, with the effects that act on it.
 
-kappa'' = -(1/tau_1 + 1/tau_2) kappa' - kappa/(tau_1 tau_2) + K/(tau_1 tau_2), where the
-target K is C0 S plus biases. Linear between switches: the response to a held valve has a
-closed form, also for tau_1 = tau_2. Effects with a nonlinear restoring term or rate break it.
+The law is that of `srs_opt.model.actuator_law`, (14)-(15), with the target K = C0 S plus biases. Effects
+with a nonlinear restoring term or rate break its closed form; then it is integrated.
 """
 
 from __future__ import annotations
@@ -11,27 +10,9 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from srs_opt.model.effects.effect import Actuation
+from srs_opt.effects.effect import Actuation
+from srs_opt.model.actuator_law import acceleration, held
 from srs_opt.model.parameters import Parameters
-
-_SERIES_RADIUS = 0.1
-
-
-def decay(time: ca.SX, tau1: ca.SX, tau2: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Return the impulse response phi(t) of the two time constants and its derivative.
-
-    phi = (exp(-t/tau_2) - exp(-t/tau_1)) / (1/tau_1 - 1/tau_2), regular for tau_1 = tau_2 (a series
-    there) and without overflow however unlike the two are.
-    """
-    mean = (1 / tau1 + 1 / tau2) / 2
-    z = (1 / tau1 - 1 / tau2) / 2 * time
-    slow, fast = ca.exp(-time / tau1), ca.exp(-time / tau2)
-    small = ca.fabs(z) < _SERIES_RADIUS
-    safe = ca.if_else(small, 1.0, z)
-    z2 = ca.if_else(small, z * z, 0.0)
-    series = 1 + z2 / 6 * (1 + z2 / 20 * (1 + z2 / 42 * (1 + z2 / 72)))  # sinh(z)/z
-    phi = time * ca.if_else(small, ca.exp(-mean * time) * series, (fast - slow) / (2 * safe))
-    return phi, (slow + fast) / 2 - mean * phi
 
 
 @dataclass(frozen=True)
@@ -106,9 +87,7 @@ class Actuator:
             if effect.slowness is not None:
                 slow = slow * effect.slowness(e, Actuation(valve, state.kappa, p["pressure_kpa"], memory))
         tau1, tau2 = p["tau1_s"] * slow, p["tau2_s"] * slow
-        ddkappa = (self.target(valve, state) - restoring) / (tau1 * tau2) - (
-            1 / tau1 + 1 / tau2
-        ) * state.dkappa
+        ddkappa = acceleration(self.target(valve, state), restoring, state.dkappa, tau1, tau2)
         return ActuatorState(state.dkappa, ddkappa, tuple(memory_rates))
 
     def jerk(self, state: ActuatorState, valve: ca.SX) -> ca.SX:
@@ -122,12 +101,7 @@ class Actuator:
         """Return the state after holding `valve` for `time`: exact where linear, else one RK4 step."""
         if self.linear:
             tau1, tau2 = self.parameters["tau1_s"], self.parameters["tau2_s"]
-            phi, dphi = decay(time, tau1, tau2)
-            offset = state.kappa - self.target(valve)
-            stay = dphi + (1 / tau1 + 1 / tau2) * phi
-            kappa = self.target(valve) + stay * offset + phi * state.dkappa
-            dkappa = dphi * state.dkappa - phi / (tau1 * tau2) * offset
-            return ActuatorState(kappa, dkappa)
+            return ActuatorState(*held(self.target(valve), state.kappa, state.dkappa, time, tau1, tau2))
         x = state.vector()
 
         def slope(v: ca.SX) -> ca.SX:

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
+from srs_opt.geometry import turn_by
 from srs_opt.model.chambers import NO_GROWTH, Chambers, Drive, Growth, chord_function
 from srs_opt.model.compliant import CompliantModel
 from srs_opt.model.kinematics import Chain
@@ -134,7 +135,7 @@ class BendingChain:
         rows = [[y[0]], [y[1]], [dy[0]], [dy[1]], [ddy[0]], [ddy[1]]]
         for k in range(self.links - 1):
             c0, c1, c2, c3, *mixed, c_half, s_half = self._chord(kappa[k], chambers.length[k], p)
-            c, s = c * c_half - s * s_half, s * c_half + c * s_half
+            c, s = turn_by(c_half, s_half, c, s)
             turn1, turn2 = (v[3 + k] - v[2 + k] for v in (dy, ddy))
             growth = chambers.of_chord(k, mixed, turn1) if mixed else NO_GROWTH
             segment = Segment((c0, c1, c2, c3), (c, s), growth)
@@ -150,7 +151,7 @@ class BendingChain:
             for row, step in zip(rows, steps):
                 row.append(row[-1] + step)
             segments.append(segment)
-            c, s = c * c_half - s * s_half, s * c_half + c * s_half
+            c, s = turn_by(c_half, s_half, c, s)
             cosines.append(c)
             sines.append(s)
         x, y_, vx, vy, ax, ay = (ca.vertcat(*row) for row in rows)
@@ -162,7 +163,8 @@ class BendingChain:
         """Return the forces on the links at places and velocities in a frame (x, y, heading) of the room."""
         x, y, heading = frame[0], frame[1], frame[2]
         c, s = ca.cos(heading), ca.sin(heading)
-        room_x, room_y = x + c * place[0] - s * place[1], y + s * place[0] + c * place[1]
+        dx, dy = turn_by(c, s, *place)
+        room_x, room_y = x + dx, y + dy
         v = Chain(*velocity, ca.SX.zeros(self.links, 1))
         return self.model.forces_on_links(v, cos, sin, room_x, room_y, heading, kappa)
 

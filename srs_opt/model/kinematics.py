@@ -13,6 +13,8 @@ from dataclasses import dataclass
 
 import casadi as ca
 
+from srs_opt.geometry import turn_by
+
 _SERIES_RADIUS = 0.3  # below it the Taylor series of sinc is exact to rounding
 
 
@@ -102,8 +104,8 @@ def segment_chord(
     if not ca.SX(gap_ratio).is_zero():
         gap_cos, gap_sin = ca.cos(bend * kappa), ca.sin(bend * kappa)
         gap_chord, gap_slope = _sinc_and_slope(bend * kappa, gap_cos, gap_sin)
-        middle_cos, middle_sin = cos * gap_cos - sin * gap_sin, sin * gap_cos + cos * gap_sin
-        cos, sin = middle_cos * gap_cos - middle_sin * gap_sin, middle_sin * gap_cos + middle_cos * gap_sin
+        middle_cos, middle_sin = turn_by(gap_cos, gap_sin, cos, sin)
+        cos, sin = turn_by(gap_cos, gap_sin, middle_cos, middle_sin)
     else:
         middle_cos, middle_sin = cos, sin
     half = segment_length / 2
@@ -112,6 +114,19 @@ def segment_chord(
         bend * gap_slope * middle_cos - (half + bend) * gap_chord * middle_sin
     )
     return chord, slope, cos, sin
+
+
+def segment_sagitta(
+    kappa: ca.SX, segment_length: ca.SX, gap_length: ca.SX, gap_ratio: ca.SX | float
+) -> ca.SX:
+    """Return how far a segment's middle lies from its chord, m; to the right for kappa > 0.
+
+    Seen from the middle, half the arc ends at h = l kappa/2, then half a gap of turn g follows: their chords
+    stand at h/2 and h + g/2.
+    """
+    h, g = segment_length * kappa / 2, gap_length * gap_ratio * kappa / 2
+    arc_part = segment_length / 2 * sinc(h / 2) * ca.sin(h / 2)
+    return arc_part + gap_length / 2 * sinc(g / 2) * ca.sin(h + g / 2)
 
 
 def chord_by_length(
@@ -188,16 +203,17 @@ def body_frame_chain(
     for i in range(kappa.shape[0]):
         chord, slope, c_half, s_half = segment_chord(kappa[i], length[i], gap_length, gap_ratio)
         # two half turns by complex products: no further cosine along the chain
-        c, s = c * c_half - s * s_half, s * c_half + c * s_half
+        c, s = turn_by(c_half, s_half, c, s)
         middle_rate = (angle_rate[i] + angle_rate[i + 1]) / 2
         along, across = slope * dkappa[i], chord * middle_rate
         if not growth[i].is_zero():
             along += growth[i] * chord_by_length(kappa[i], length[i], gap_length, gap_ratio)
         x.append(x[-1] + chord * c)
         y.append(y[-1] + chord * s)
-        x_rate.append(x_rate[-1] + along * c - across * s)
-        y_rate.append(y_rate[-1] + along * s + across * c)
-        c, s = c * c_half - s * s_half, s * c_half + c * s_half
+        step_x, step_y = turn_by(c, s, along, across)
+        x_rate.append(x_rate[-1] + step_x)
+        y_rate.append(y_rate[-1] + step_y)
+        c, s = turn_by(c_half, s_half, c, s)
         cosines.append(c)
         sines.append(s)
     weight = mass * (1 / ca.sum1(mass))

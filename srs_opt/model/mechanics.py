@@ -13,7 +13,8 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from srs_opt.model.effects.effect import LinkState
+from srs_opt.effects.effect import LinkState
+from srs_opt.geometry import turn_back_by, turn_by
 from srs_opt.model.friction import FRICTION_LAWS
 from srs_opt.model.kinematics import Chain, body_frame_chain
 from srs_opt.model.parameters import Parameters
@@ -136,8 +137,8 @@ class Mechanics(ABC):
         """Return the forces on the links, in the robot's frame, for a pose and a body velocity."""
         c, s = ca.cos(pose[2]), ca.sin(pose[2])
         chain = self.chain
-        room_x = pose[0] + c * chain.x - s * chain.y
-        room_y = pose[1] + s * chain.x + c * chain.y
+        x, y = turn_by(c, s, chain.x, chain.y)
+        room_x, room_y = pose[0] + x, pose[1] + y
         v = self.link_velocities(u_x, u_y, yaw_rate)
         return self.forces_on_links(v, chain.cos, chain.sin, room_x, room_y, pose[2], self.kappa)
 
@@ -166,8 +167,8 @@ class Mechanics(ABC):
         skews += [effect.steering(e, bend) for effect, e in p.effects if effect.steering]
         if skews:
             skew = sum(skews[1:], skews[0])
-            c, s = cos * ca.cos(skew) - sin * ca.sin(skew), sin * ca.cos(skew) + cos * ca.sin(skew)
-        v_t, v_n = c * v.x + s * v.y, c * v.y - s * v.x
+            c, s = turn_by(ca.cos(skew), ca.sin(skew), cos, sin)
+        v_t, v_n = turn_back_by(c, s, v.x, v.y)
         along, across = FRICTION_LAWS[p.structure.friction_law](v_t, v_n, p["friction_speed_m_s"])
         f_t = -p["friction_tangential"] * normal * along
         f_n = -p["friction_normal"] * normal * across
@@ -205,8 +206,7 @@ class Mechanics(ABC):
     def pose_rate(self, pose: ca.SX, velocity: ca.SX) -> ca.SX:
         """Return (x', y', psi') for the body velocity (u_x, u_y, yaw momentum)."""
         c, s = ca.cos(pose[2]), ca.sin(pose[2])
-        u_x, u_y = velocity[0], velocity[1]
-        return ca.vertcat(c * u_x - s * u_y, s * u_x + c * u_y, self.yaw_rate(velocity[2]))
+        return ca.vertcat(*turn_by(c, s, velocity[0], velocity[1]), self.yaw_rate(velocity[2]))
 
     def velocity_rate(self, pose: ca.SX, velocity: ca.SX) -> tuple[ca.SX, ca.SX]:
         """Return the rate of (u_x, u_y, yaw momentum) and the friction power.

@@ -10,9 +10,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from srs_opt.effects import known_effects
+from srs_opt.effects.effect import Effect
 from srs_opt.errors import InputError, UnsupportedEffectError
-from srs_opt.model.effects import known_effects
-from srs_opt.model.effects.effect import Effect
 from srs_opt.robot import Robot
 
 ROBOT_PARAMETERS = (

@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from srs_opt.orbit.motion import rotate
+from srs_opt.geometry import rotate
 from srs_opt.robot import Robot
 from srs_opt.simulate.integrate import Integrator
 from srs_opt.simulate.shapes import centre_lines

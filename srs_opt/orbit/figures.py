@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from srs_opt.figures import COLOURS, LEFT, PAGE_IN, RIGHT, SEQUENTIAL, draw_body, new_figure, styled
+from srs_opt.geometry import centre_of_rotation, rotate
 from srs_opt.orbit.body import body_over_cycle, integrator
-from srs_opt.orbit.motion import centre_of_rotation, rotate
 from srs_opt.simulate.rosenbrock import VELOCITY, WORK
 
 if TYPE_CHECKING:

@@ -15,13 +15,13 @@ from srs_opt.gait import Gait, check_gait
 from srs_opt.model.state import HEADING, POSE
 from srs_opt.orbit.actuators import actuator_multiplier
 from srs_opt.orbit.body import body_over_cycle, integrator
-from srs_opt.orbit.motion import CycleMotion, cycle_motion
 from srs_opt.orbit.solve import PeriodicSolution, search_orbit
 from srs_opt.parallel import executor
 from srs_opt.parallel.sweep import sweep
 from srs_opt.result import Result
 from srs_opt.robot import Robot
 from srs_opt.simulate.batched import Search, run_batched, run_one
+from srs_opt.simulate.cycle_motion import CycleMotion, cycle_motion
 from srs_opt.simulate.integrate import TOLERANCE_M_S, Integrator
 from srs_opt.simulate.rosenbrock import WORK
 

@@ -26,10 +26,10 @@ from pathlib import Path
 
 import casadi as ca
 
+from srs_opt.effects.plugins import registered
 from srs_opt.errors import InputError
 from srs_opt.files import temporary_folder
 from srs_opt.interrupts import signals_deferred
-from srs_opt.model.effects.plugins import registered
 
 FLAGS = ("-O1", "-fPIC", "-shared", "-fno-math-errno")
 
@@ -76,9 +76,11 @@ def _source_digest() -> str:
     """Return a hash of the package's equations: what the generated code is made from."""
     digest = hashlib.sha256()
     package = Path(__file__).resolve().parent.parent
-    for folder in ("model", "simulate"):
-        for file in sorted(p for p in (package / folder).rglob("*.*") if p.suffix in (".py", ".in")):
-            digest.update(file.read_bytes())
+    files = [package / "geometry.py"]
+    for folder in ("model", "effects", "simulate"):
+        files += sorted(p for p in (package / folder).rglob("*.*") if p.suffix in (".py", ".in"))
+    for file in files:
+        digest.update(file.read_bytes())
     return digest.hexdigest()
 
 

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
+from srs_opt.geometry import turn_back_by, turn_by
 from srs_opt.model.actuator import Actuator, ActuatorState
 from srs_opt.model.bending_chain import BendingChain
 from srs_opt.model.chain_derivatives import derivatives, mass_matrix
@@ -67,8 +68,8 @@ def compliant_step(structure: Structure) -> ca.Function:
         bend = parameters["segment_length_m"] * (half.dkappa - end.dkappa)
         shape_error, end = ca.sumsqr(LEVER_M * bend), half
     moved, velocity, kappa, dkappa = to_body(y, dy, end.kappa, end.dkappa, p)
-    c, s = ca.cos(x[2]), ca.sin(x[2])
-    pose = ca.vertcat(x[0] + c * moved[0] - s * moved[1], x[1] + s * moved[0] + c * moved[1], x[2] + moved[2])
+    step = ca.vertcat(*turn_by(ca.cos(x[2]), ca.sin(x[2]), moved[0], moved[1]), moved[2])
+    pose = x[POSE] + step
     following = ca.vertcat(pose, velocity, x[WORK] + total[-1], kappa, dkappa, end.vector())
     assert following.shape[0] == layout.size >= BODY_STATES
     return ca.Function(
@@ -183,15 +184,9 @@ def _conversions(model: CompliantModel) -> tuple[ca.Function, ca.Function]:
     turn, spin = ca.sum1(y[2:]) / n, ca.sum1(dy[2:]) / n
     tail, tail_rate, momentum = body(bend, rate, spin, *free, p)
     cos, sin = ca.cos(turn), ca.sin(turn)
-    moved = ca.vertcat(
-        y[0] - cos * tail[0] + sin * tail[1],
-        y[1] - sin * tail[0] - cos * tail[1],
-        turn,
-    )
-    speed = ca.vertcat(
-        cos * dy[0] + sin * dy[1] - tail_rate[0],
-        cos * dy[1] - sin * dy[0] - tail_rate[1],
-        momentum,
-    )
+    tail_x, tail_y = turn_by(cos, sin, tail[0], tail[1])
+    moved = ca.vertcat(y[0] - tail_x, y[1] - tail_y, turn)
+    along, across = turn_back_by(cos, sin, dy[0], dy[1])
+    speed = ca.vertcat(along - tail_rate[0], across - tail_rate[1], momentum)
     to_body = ca.Function("to_body", [y, dy, *free, p], [moved, speed, bend, rate], {"cse": True})
     return to_tail, to_body

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from srs_opt.figures import COLOURS, PAGE_IN, draw_body, new_figure, styled
-from srs_opt.orbit.motion import rotate
+from srs_opt.geometry import rotate
 from srs_opt.simulate.integrate import Integrator
 from srs_opt.simulate.shapes import centre_lines
 

@@ -10,10 +10,11 @@ import numpy as np
 
 from srs_opt.errors import InputError
 from srs_opt.gait import Gait, check_gait
-from srs_opt.orbit.motion import CycleMotion, cycle_motion, rotate
+from srs_opt.geometry import rotate
 from srs_opt.result import Result
 from srs_opt.robot import Robot
 from srs_opt.simulate import compiled
+from srs_opt.simulate.cycle_motion import CycleMotion, cycle_motion
 from srs_opt.simulate.integrate import TOLERANCE_M_S, Integrator, Trajectory
 from srs_opt.simulate.shapes import centre_lines
 from srs_opt.simulate.timeline import Timeline

@@ -13,9 +13,9 @@ from srs_opt.calibrate.instruments import check_expectations
 from srs_opt.calibrate.model import Model
 from srs_opt.calibrate.result import bench_warnings
 from srs_opt.calibrate.run import calibrate
+from srs_opt.effects import all_effects
 from srs_opt.errors import InputError
 from srs_opt.measurement.dataset import load_dataset
-from srs_opt.model.effects import all_effects
 from srs_opt.robot import wpi_srs
 from virtual_lab.dataset import Recording, write_dataset
 from virtual_lab.trials import Trial

@@ -6,7 +6,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from srs_opt.gait import Wave
-from srs_opt.model.actuator import decay
+from srs_opt.model.actuator_law import decay
 from srs_opt.model.parameters import Structure
 from srs_opt.model.registry import build
 from srs_opt.orbit.actuators import periodic_actuators

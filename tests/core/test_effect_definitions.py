@@ -6,10 +6,10 @@ import oracle_snake as oracle
 import pytest
 
 from srs_opt.document import Document
+from srs_opt.effects import all_effects
 from srs_opt.errors import InputError
 from srs_opt.gait import published_wave
 from srs_opt.model.actuator import ActuatorState
-from srs_opt.model.effects import all_effects
 from srs_opt.model.parameters import Structure, room_effects, valve_delay_s
 from srs_opt.model.registry import build
 from srs_opt.orbit.steady import steady_gait

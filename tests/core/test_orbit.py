@@ -8,11 +8,12 @@ from scipy.integrate import trapezoid
 
 from srs_opt.errors import InputError
 from srs_opt.gait import Gait, Wave, published_wave
+from srs_opt.geometry import centre_of_rotation
 from srs_opt.orbit.actuators import periodic_actuators
 from srs_opt.orbit.body import integrator
-from srs_opt.orbit.motion import centre_of_rotation, largest
 from srs_opt.orbit.steady import steady_gait
 from srs_opt.robot import wpi_srs
+from srs_opt.simulate.cycle_motion import largest
 from srs_opt.simulate.integrate import Integrator
 from srs_opt.simulate.rosenbrock import BODY_STATES, VELOCITY
 from srs_opt.simulate.timeline import Timeline

@@ -19,8 +19,8 @@ from srs_opt.discrepancy.locate import stages
 from srs_opt.discrepancy.pipeline import diagnose
 from srs_opt.discrepancy.search import Search
 from srs_opt.discrepancy.split import split_trials
+from srs_opt.effects import all_effects, generic_effects
 from srs_opt.measurement.dataset import load_dataset
-from srs_opt.model.effects import all_effects, generic_effects
 from srs_opt.robot import load_robot
 from virtual_lab.dataset import Recording, write_dataset
 from virtual_lab.trials import small_design

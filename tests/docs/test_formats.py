@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 from planners.maze.load import ENDINGS
+from srs_opt.effects import known_effects
 from srs_opt.gait_map.grid import COLUMNS
 from srs_opt.measurement import bench_files, read
-from srs_opt.model.effects import known_effects
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "formats.md").read_text(encoding="utf-8")

@@ -7,9 +7,9 @@ from virtual_lab.draw import draw_truth
 from virtual_lab.trials import small_design
 
 PLUGIN = """
-from srs_opt.model.effects import register_effect
-from srs_opt.model.effects.effect import Effect
-from srs_opt.model.effects.parameter import EffectParameter
+from srs_opt.effects import register_effect
+from srs_opt.effects.effect import Effect
+from srs_opt.effects.parameter import EffectParameter
 register_effect(Effect("my_rolling", "ground", (EffectParameter("damping", "N s/m", 0.06, lower=0),),
                        what="wheels in mud", look="look at the wheels",
                        rolling_force=lambda e, v: -e["damping"] * v))

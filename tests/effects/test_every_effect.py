@@ -15,11 +15,11 @@ from srs_opt.calibrate.forms import Form, form_of_entry, forms_of
 from srs_opt.calibrate.instruments import QUANTITIES, check_expectations
 from srs_opt.calibrate.model import Conditions, Model
 from srs_opt.calibrate.run import calibrate
+from srs_opt.effects import all_effects, built_in, plugins
+from srs_opt.effects.effect import HOOKS
+from srs_opt.effects.parameter import Component
 from srs_opt.measurement.dataset import load_dataset
 from srs_opt.measurement.records import Trial
-from srs_opt.model.effects import all_effects, built_in, plugins
-from srs_opt.model.effects.effect import HOOKS
-from srs_opt.model.effects.parameter import Component
 from srs_opt.model.parameters import Structure
 from srs_opt.model.registry import build
 from srs_opt.plugins import load_plugin

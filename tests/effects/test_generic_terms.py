@@ -6,11 +6,11 @@ import pytest
 
 from srs_opt.calibrate.forms import forms_of
 from srs_opt.calibrate.model import Conditions, Model
+from srs_opt.effects import all_effects, generic_effects, known_effects
+from srs_opt.effects.generic import TERMS
+from srs_opt.effects.parameter import Component
 from srs_opt.gait import Wave
 from srs_opt.gait_opt.collocation.point import PointKind, _linear_curvature, _Symbols
-from srs_opt.model.effects import all_effects, generic_effects, known_effects
-from srs_opt.model.effects.generic import TERMS
-from srs_opt.model.effects.parameter import Component
 from srs_opt.model.parameters import Structure, room_effects
 from srs_opt.model.registry import build
 from srs_opt.robot import load_robot, save_robot, wpi_srs

@@ -7,10 +7,10 @@ from effect_lab import PLUGIN, small_set
 
 from srs_opt.calibrate.__main__ import main as calibrate
 from srs_opt.discrepancy.__main__ import main as discrepancy
-from srs_opt.model.effects import plugins as effect_plugins
-from srs_opt.model.effects import register_effect
-from srs_opt.model.effects.effect import Effect
-from srs_opt.model.effects.parameter import EffectParameter
+from srs_opt.effects import plugins as effect_plugins
+from srs_opt.effects import register_effect
+from srs_opt.effects.effect import Effect
+from srs_opt.effects.parameter import EffectParameter
 from srs_opt.robot import load_robot, save_robot
 from srs_opt.simulate.__main__ import main as simulate
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planners.motion.changes import with_changes
+from planners.apps.table_changes import with_changes
 from planners.motion.valves import DEFAULT_LIMITS, Joints
 from srs_opt.controller.c_source import changes_source, write_changes, write_program
 from srs_opt.controller.program import Program
@@ -98,7 +98,12 @@ def test_reckoning_with_changes_is_far_better_than_steady_displacements(table):
 
 def test_changes_are_simulated_anew_and_kept_on_file(table, tmp_path):
     few = first_gaits(table, ("fast", "fast R0.314 left", "slow 0.05"))
-    again = with_changes(wpi_srs(), few.with_gaits(few.gaits), DEFAULT_LIMITS)
+    again = with_changes(
+        wpi_srs(),
+        few.with_gaits(few.gaits),
+        min_dwell_s=DEFAULT_LIMITS.min_dwell_s,
+        tick_s=DEFAULT_LIMITS.tick_s,
+    )
     back = load_table(save_table(again, tmp_path / "table.json"))
     assert np.array_equal(back.changes.moved, again.changes.moved)
     assert back.changes.moved.any(axis=(2, 3)).all()

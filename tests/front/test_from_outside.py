@@ -5,11 +5,11 @@ import pytest
 from planners.maze import load
 from planners.plan import registry as planners
 from srs_opt import plugins
+from srs_opt.effects import known_effects
+from srs_opt.effects import plugins as effects
 from srs_opt.errors import InputError
 from srs_opt.gait_opt.objectives import registry as objectives
 from srs_opt.measurement.takes import formats
-from srs_opt.model.effects import known_effects
-from srs_opt.model.effects import plugins as effects
 
 PLUGIN = """
 from pathlib import Path
@@ -24,9 +24,9 @@ from srs_opt.gait_opt.objectives.objective import Objective
 from srs_opt.gait_opt.objectives.registry import register_objective
 from srs_opt.measurement.takes.formats import TrackFormat, register
 from srs_opt.measurement.takes.take import Take
-from srs_opt.model.effects import register_effect
-from srs_opt.model.effects.effect import Effect
-from srs_opt.model.effects.parameter import EffectParameter
+from srs_opt.effects import register_effect
+from srs_opt.effects.effect import Effect
+from srs_opt.effects.parameter import EffectParameter
 
 register_effect(Effect("mud", "ground", (EffectParameter("damping", "N s/m", 0.06, lower=0),),
                        what="wheels in mud", look="look at the wheels",

@@ -12,8 +12,9 @@ from srs_opt.measurement.actuator_bench import combine_steps
 from srs_opt.measurement.checks import compare_checks
 from srs_opt.measurement.records import Check, SpringCarTest, StepTest, TowTest
 from srs_opt.measurement.spring_car import breakaway_friction
-from srs_opt.measurement.steps import fit_step, fit_steps, step_response
+from srs_opt.measurement.steps import fit_step, fit_steps
 from srs_opt.measurement.tow import analyse_tow
+from srs_opt.model.actuator_law import step_response
 
 TIME = np.arange(150) * 0.01
 

@@ -7,7 +7,8 @@ from srs_opt.measurement import bending
 from srs_opt.measurement.actuator_bench import combine_steps
 from srs_opt.measurement.bending import bench_robot, fit_bending
 from srs_opt.measurement.records import StepTest
-from srs_opt.measurement.steps import fit_steps, step_response
+from srs_opt.measurement.steps import fit_steps
+from srs_opt.model.actuator_law import step_response
 from srs_opt.robot import wpi_srs
 from srs_opt.simulate.integrate import Integrator
 from srs_opt.simulate.timeline import Timeline

@@ -71,7 +71,7 @@ def test_places_and_slopes(spots):
 
 @pytest.mark.parametrize("ratio", [False, True])
 def test_calibration_sees_the_same_places(ratio):
-    from srs_opt.model.effects import all_effects
+    from srs_opt.effects import all_effects
 
     effects = tuple(n for n, e in all_effects().items() if e.gap_ratio) if ratio else ()
     parameters, m, _ = build(Structure("complex", 5, "per_axis", effects))

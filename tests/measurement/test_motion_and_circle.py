@@ -140,7 +140,8 @@ def test_pictures(tmp_path):
     from srs_opt.measurement.figures import bends_figure, circle_figure, step_figure, track_figure
     from srs_opt.measurement.records import StepTest
     from srs_opt.measurement.smooth import Intensity, smooth_shape
-    from srs_opt.measurement.steps import fit_step, step_response
+    from srs_opt.measurement.steps import fit_step
+    from srs_opt.model.actuator_law import step_response
 
     time, path, _ = lab(2.0, 0.4, seconds=2.0)
     trial = measured(time, path, 2.0, 0.4)

@@ -4,11 +4,11 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from srs_opt.effects import all_effects
 from srs_opt.gait import Wave
 from srs_opt.model.bending_chain import BendingChain
 from srs_opt.model.chain_derivatives import derivatives
 from srs_opt.model.chambers import Drive
-from srs_opt.model.effects import all_effects
 from srs_opt.model.parameters import Structure
 from srs_opt.model.registry import build
 from srs_opt.orbit.steady import steady_gait

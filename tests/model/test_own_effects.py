@@ -8,19 +8,19 @@ from pathlib import Path
 
 import pytest
 
+from srs_opt.effects import plugins, register_effect
+from srs_opt.effects.effect import Effect
+from srs_opt.effects.parameter import EffectParameter, link
 from srs_opt.errors import InputError
 from srs_opt.gait import published_wave
-from srs_opt.model.effects import plugins, register_effect
-from srs_opt.model.effects.effect import Effect
-from srs_opt.model.effects.parameter import EffectParameter, link
 from srs_opt.orbit.steady import steady_gait
 from srs_opt.robot import wpi_srs
 
 ROOT = Path(__file__).resolve().parents[2]
 FILE = """
-from srs_opt.model.effects import register_effect
-from srs_opt.model.effects.effect import Effect
-from srs_opt.model.effects.parameter import EffectParameter
+from srs_opt.effects import register_effect
+from srs_opt.effects.effect import Effect
+from srs_opt.effects.parameter import EffectParameter
 register_effect(Effect("mud", "ground", (EffectParameter("damping", "N s/m", 0.1, lower=0),),
                        rolling_force=lambda e, v: {sign} * e["damping"] * v))
 """

@@ -4,10 +4,11 @@ from planner_rooms import corridor, gate, maze_of
 
 from planners.drive.contact import BodyWatch
 from planners.drive.execute import execute
-from planners.drive.track import Learned, reference_of
+from planners.drive.reference import reference_of
 from planners.plan.answer import Plan
 from planners.plan.certify import certify
 from planners.plan.solve import solve_with_lattice
+from planners.search.track import Learned
 from srs_opt.errors import InputError
 from srs_opt.simulate.integrate import Integrator
 

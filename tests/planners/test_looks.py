@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from planner_rooms import corridor
 
-from planners.motion.table import body_in_room
 from planners.plan.looks import Tolerance, looks
 from planners.plan.solve import solve_with_lattice
 from planners.search.tree import arrival_index, at_rest
+from srs_opt.geometry import points_in_room
 from srs_opt.simulate.shapes import centre_lines
 
 
@@ -27,7 +27,7 @@ def moved(state, rng, t, speed=True):
 
 
 def room_of(problem, trajectory):
-    lines = body_in_room(centre_lines(problem.integrator, trajectory.kappa), trajectory.pose)
+    lines = points_in_room(centre_lines(problem.integrator, trajectory.kappa), trajectory.pose)
     arrived = arrival_index(problem.goal, trajectory.pose)
     return float(problem.body.exact(lines[: None if arrived is None else arrived + 1]).min())
 

@@ -5,7 +5,7 @@ import pytest
 
 from planners.motion.robots import undelayed
 from planners.motion.store import _read, table_key, write_transitions
-from planners.motion.table import body_in_room
+from srs_opt.geometry import points_in_room
 from srs_opt.model.outline import centre_line_function
 from srs_opt.orbit.body import integrator
 
@@ -72,7 +72,7 @@ def test_body_in_room_agrees_with_the_kinematics(robot):
     run = integrator(robot)
     kappa = np.array([5.0, -8.0, 3.0, 10.0])
     x, y = (np.asarray(v).ravel() for v in centre_line_function(run.structure, 1)(kappa, run.pack(0, 1)))
-    placed = body_in_room(np.stack([x, y], axis=-1), np.array([0.2, 0.1, np.pi / 2]))
+    placed = points_in_room(np.stack([x, y], axis=-1), np.array([0.2, 0.1, np.pi / 2]))
     assert placed[:, 0] == pytest.approx(0.2 - y)
     assert placed[:, 1] == pytest.approx(0.1 + x)
 

@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from srs_opt.model.effects import built_in
+from srs_opt.effects import built_in
 from virtual_lab import kernel
 from virtual_lab.assemble import assemble
 from virtual_lab.bench import tow_force

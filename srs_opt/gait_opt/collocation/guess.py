@@ -11,8 +11,8 @@ from srs_opt.gait import Gait
 from srs_opt.gait_opt.collocation.layout import ENVELOPE_UNIT_M, PRESSURE_UNIT_KPA, Layout
 from srs_opt.gait_opt.collocation.layout import Mesh as CycleMesh
 from srs_opt.gait_opt.collocation.point import BODY, PointKind, linear_shape
+from srs_opt.geometry import centre_of_rotation, rotate
 from srs_opt.model.registry import build, state_layout
-from srs_opt.orbit.motion import rotate
 from srs_opt.orbit.steady import Orbit
 from srs_opt.robot import Robot
 from srs_opt.simulate.rosenbrock import VELOCITY
@@ -101,8 +101,6 @@ def valve_levels(gait: Gait, mesh: CycleMesh, first_s: float) -> np.ndarray:
 
 
 def _centre(displacement: np.ndarray) -> np.ndarray:
-    from srs_opt.orbit.motion import centre_of_rotation
-
     centre = centre_of_rotation(displacement)
     assert centre is not None
     return centre

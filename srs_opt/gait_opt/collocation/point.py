@@ -26,9 +26,11 @@ from pathlib import Path
 import casadi as ca
 
 from srs_opt.gait_opt.collocation.bending import bend_acceleration
-from srs_opt.gait_opt.collocation.curvature import periodic_curvature, time_constants
+from srs_opt.geometry import turn_by
 from srs_opt.model.actuator import Actuator, ActuatorState
+from srs_opt.model.actuator_law import acceleration, periodic_curvature, time_constants
 from srs_opt.model.compliant import CompliantModel
+from srs_opt.model.kinematics import segment_sagitta
 from srs_opt.model.mechanics import Mechanics
 from srs_opt.model.parameters import Structure
 from srs_opt.model.registry import build
@@ -194,7 +196,7 @@ def _shape(
         return own.kappa, own.dkappa, rates.dkappa, rates.vector()
     kappa, dkappa, valve = ca.vertsplit(closed, kind.segments)
     tau1, tau2 = time_constants(actuator.parameters)
-    linear = (actuator.target(valve) - kappa) / (tau1 * tau2) - (1 / tau1 + 1 / tau2) * dkappa
+    linear = acceleration(actuator.target(valve), kappa, dkappa, tau1, tau2)
     if actuator.linear:
         return kappa, dkappa, linear, ca.SX(0, 1)
     away = actuator.unstack(deviation)
@@ -210,13 +212,13 @@ def _lateral_reach(m: Mechanics, heading: ca.SX, ahead: ca.SX, aside: ca.SX, ben
     xs, ys = [chain.x], [chain.y]
     for i in range(m.links - 1):
         chord = ca.vertcat(chain.x[i + 1] - chain.x[i], chain.y[i + 1] - chain.y[i])
-        sagitta = m.kappa[i] * length[i] ** 2 / 8
+        sagitta = segment_sagitta(m.kappa[i], length[i], m.gap_length, m.gap_ratio)
         norm = ca.sqrt(ca.dot(chord, chord))
         xs.append((chain.x[i] + chain.x[i + 1]) / 2 + sagitta * chord[1] / norm)
         ys.append((chain.y[i] + chain.y[i + 1]) / 2 - sagitta * chord[0] / norm)
     x, y = ca.vertcat(*xs), ca.vertcat(*ys)
-    c, s = ca.cos(heading), ca.sin(heading)
-    room_x, room_y = ahead + c * x - s * y, aside + s * x + c * y
+    dx, dy = turn_by(ca.cos(heading), ca.sin(heading), x, y)
+    room_x, room_y = ahead + dx, aside + dy
     # distance to the centre of rotation minus the radius, in a form that is regular for a straight path
     distance = ca.sqrt((bend * room_x) ** 2 + (1 - bend * room_y) ** 2)
     return (2 * room_y - bend * (room_x**2 + room_y**2)) / (1 + distance)
@@ -270,7 +272,7 @@ def _equations(kind: PointKind, s: _Symbols, p: ca.SX, closed: ca.SX) -> ca.SX:
 def _sources() -> str:
     folder = Path(__file__).parent
     digest = hashlib.sha256()
-    for name in ("bending.py", "curvature.py", "point.py"):
+    for name in ("bending.py", "point.py"):
         digest.update((folder / name).read_bytes())
     return digest.hexdigest()[:16]
 

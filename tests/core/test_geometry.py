@@ -1,0 +1,60 @@
+"""Rotations and poses against complex numbers; a segment's chord and sagitta against its arcs, summed up."""
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from srs_opt.geometry import (
+    compose,
+    distance_along,
+    points_in_room,
+    relative,
+    rotate,
+    rotate_back,
+    rotation_matrix,
+    wrapped,
+)
+from srs_opt.model.kinematics import segment_sagitta
+
+FRAME = np.array([0.3, -0.2, 2.5])
+
+
+def test_rotations_are_products_of_complex_numbers():
+    rng = np.random.default_rng(1)
+    x, y, angle = rng.normal(size=(3, 20))
+    turned = (x + 1j * y) * np.exp(1j * angle)
+    assert np.allclose(rotate(angle, x, y), (turned.real, turned.imag))
+    assert np.allclose(rotate_back(angle, *rotate(angle, x, y)), (x, y))
+    assert np.allclose(rotation_matrix(0.7) @ [x[0], y[0]], rotate(0.7, x[0], y[0]))
+    assert np.allclose(np.exp(1j * wrapped(9 * angle)), np.exp(9j * angle))
+    assert np.abs(wrapped(9 * angle)).max() <= np.pi
+
+
+def test_poses_compose_and_come_back():
+    local = np.random.default_rng(2).normal(size=(4, 5, 3))
+    room = compose(FRAME, local)
+    place = FRAME[0] + 1j * FRAME[1] + (local[..., 0] + 1j * local[..., 1]) * np.exp(1j * FRAME[2])
+    assert np.allclose(room[..., 0] + 1j * room[..., 1], place)
+    assert np.allclose(relative(FRAME, room), local)
+    assert np.allclose(points_in_room(local[..., :2], FRAME), room[..., :2])
+
+
+def test_distance_along_a_square():
+    assert np.allclose(distance_along(np.array([[0, 0], [1, 0], [1, 2], [0, 2]])), [0, 1, 3, 4])
+
+
+@pytest.mark.parametrize("ratio", [0.0, 0.6])
+@pytest.mark.parametrize("kappa", [-12.0, 1e-9, 19.0])
+def test_the_middle_of_a_segment_lies_beside_its_chord(kappa, ratio):
+    length, gap, n = 0.037, 0.012, 40_000
+    step = (length + gap) / n
+    along = (np.arange(n) + 0.5) * step
+    in_chamber = (along > gap / 2) & (along < gap / 2 + length)
+    turn = np.where(in_chamber, kappa, ratio * kappa) * step
+    heading = np.cumsum(turn) - turn / 2
+    line = np.concatenate([[0], np.cumsum(step * np.exp(1j * heading))])
+    chord, middle = line[-1], line[n // 2]
+    right = -(np.conj(chord) * (middle - chord / 2)).imag / abs(chord)
+    assert float(ca.evalf(segment_sagitta(ca.SX(kappa), length, gap, ratio))) == pytest.approx(
+        right, abs=1e-8
+    )
