@@ -32,16 +32,22 @@ class Angles:
     ----------
     lin : Linearisation
         With the candidates' sizes among its coordinates.
+    apart : sequence of Candidate, optional
+        Fitted ones that are held against the others too, instead of projecting what they do out.
     """
 
-    def __init__(self, lin: Linearisation) -> None:
-        self._names = {c.name: k - lin.fitted for k, c in enumerate(lin.coordinates)}
-        self._lower = [c.lower for c in lin.coordinates[lin.fitted :]]
-        size, fitted = len(lin.coordinates), lin.fitted
-        total = sum_eliminated(lin.equations, lin.variance_inflation)[:size, :size]
-        precision, _ = priors(lin.coordinates, lin.point)
-        _, self._seen = projected(total, fitted, precision)
-        self._whole = np.diag(total)[fitted:]
+    def __init__(self, lin: Linearisation, apart: Sequence[Candidate] = ()) -> None:
+        own = {c.name for k in apart for c in k.coordinates}
+        sizes = {c.name for k in apart for c in k.sizes}
+        fitted = [k for k, c in enumerate(lin.coordinates[: lin.fitted]) if c.name not in own]
+        free = [k for k, c in enumerate(lin.coordinates) if k >= lin.fitted or c.name in sizes]
+        self._names = {lin.coordinates[k].name: n for n, k in enumerate(free)}
+        self._lower = [lin.coordinates[k].lower for k in free]
+        order = [*fitted, *free]
+        total = sum_eliminated(lin.telling, lin.variance_inflation)[np.ix_(order, order)]
+        precision, _ = priors([lin.coordinates[k] for k in order], lin.point)
+        _, self._seen = projected(total, len(fitted), precision)
+        self._whole = np.diag(total)[len(fitted) :]
 
     def columns(self, candidate: Candidate) -> list[int]:
         """Return where a candidate's sizes are; nothing for one that is fitted or not seen by the data."""

@@ -122,7 +122,8 @@ def detect(
     values, vectors = np.linalg.eigh(correlation)
     root = vectors * np.sqrt(np.maximum(values, 0))
     drawn = rng.standard_normal((DRAWS, z.size)) @ root.T
-    observed, simulated, found = [], [], []
+    observed, found = [], []
+    largest: dict[int, np.ndarray] = {}  # of the drawn values, by the number of degrees of freedom
     for group in groups:
         whiten = _whiten(correlation[np.ix_(list(group), list(group))])
         dof = whiten.shape[1]
@@ -130,8 +131,10 @@ def detect(
         p = float(chdtrc(dof, value)) if dof else 1.0
         found.append(GroupScore(value, dof, p))
         observed.append(p)
-        simulated.append(chdtrc(dof or 1, np.sum((drawn[:, list(group)] @ whiten) ** 2, axis=1)))
-    smallest = np.min(simulated, axis=0) if simulated else np.ones(1)
+        if dof:
+            values = np.square(drawn[:, list(group)] @ whiten).sum(axis=1)
+            largest[dof] = np.maximum(largest.get(dof, 0.0), values)
+    smallest = np.min([np.ones(DRAWS), *(chdtrc(dof, values) for dof, values in largest.items())], axis=0)
     adjusted = tuple(float((1 + np.sum(smallest <= p)) / (1 + smallest.size)) for p in observed)
     serial_p = float(ndtr(-serial.sum() / np.sqrt(max(serial.size, 1)))) if serial.size else 1.0
     # the family of groups and the autocorrelation share the level unequally: the latter sees little more

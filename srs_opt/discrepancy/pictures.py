@@ -80,7 +80,9 @@ def gap_figure(found: Discrepancy) -> Figure | None:
     course.set_ylabel("distance to the markers (mm)")
     course.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
     room.legend(loc="best")
-    room.set_title(f"{trial.name}, the body after {trial.time_s[last]:.1f} s")
+    # neither the trial's name, which can be long, nor the body's title may reach the legend on the right
+    figure.suptitle(f"trial {trial.name}")
+    room.set_title(f"after {trial.time_s[last]:.1f} s", loc="left")
     return figure
 
 

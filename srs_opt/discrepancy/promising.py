@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from srs_opt.calibrate.candidates import Candidate
 from srs_opt.calibrate.fit import FAR_OFF
 from srs_opt.discrepancy.alike import Angles
 from srs_opt.discrepancy.diagnostics import TELLING, Diagnostics, needed_gain
@@ -15,7 +16,10 @@ KIN_RAD = 0.8
 
 
 def promising(current: Diagnostics, depth: int, family: int) -> list[Score]:
-    """Return those of `family` candidates that deserve a refit beside `depth` effects, best first."""
+    """Return those of `family` candidates that deserve a refit beside `depth` effects, best first.
+
+    Last come the effects of which slopes about a fit that is far off say nothing, and which cost most.
+    """
     inflation = current.hypothesis.fit.variance_inflation
     scores = [
         s
@@ -39,4 +43,12 @@ def promising(current: Diagnostics, depth: int, family: int) -> list[Score]:
                 angle = angles.between(scores[0].candidate, s.candidate)
                 if angle is not None and angle < KIN_RAD:
                     chosen.append(s)
-    return [*leaps, *chosen]
+    return [*chosen, *leaps]
+
+
+def akin(diagnostics: Diagnostics, candidate: Candidate) -> bool:
+    """Whether a candidate could do about what the effects of a hypothesis that explains the data do."""
+    have = diagnostics.hypothesis.candidates
+    angles = Angles(diagnostics.linearisation, have)
+    found = (angles.between(a, candidate) for a in have if a is not candidate)
+    return any(angle is not None and angle < KIN_RAD for angle in found)

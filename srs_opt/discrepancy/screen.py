@@ -63,6 +63,8 @@ class Linearisation:
     point : Point
     equations : dict
     variance_inflation : float
+    screened : frozenset of str, optional
+        Keys of the equations that know what the candidates do; in the others they do nothing. Default: all.
     """
 
     coordinates: tuple[Coordinate, ...]
@@ -70,6 +72,13 @@ class Linearisation:
     point: Point
     equations: Mapping[str, NormalEquations]
     variance_inflation: float
+    screened: frozenset[str] | None = None
+
+    @property
+    def telling(self) -> Mapping[str, NormalEquations]:
+        """The equations that know what the candidates do."""
+        known = self.screened
+        return {n: g for n, g in self.equations.items() if known is None or n in known}
 
     def column(self, name: str) -> int:
         """Return the column of a coordinate."""
@@ -88,7 +97,7 @@ def screen(
     """
     size = len(lin.coordinates)
     index = [*range(size), next(iter(lin.equations.values())).raw.shape[0] - 1]
-    total = sum_eliminated(lin.equations, lin.variance_inflation)[np.ix_(index, index)]
+    total = sum_eliminated(lin.telling, lin.variance_inflation)[np.ix_(index, index)]
     precision, offset = priors(lin.coordinates, lin.point)
     now = np.array([lin.point.values.get(c.name, 0.0) for c in lin.coordinates])
     lower = np.array([c.lower for c in lin.coordinates]) - now

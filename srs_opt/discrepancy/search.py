@@ -5,18 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
-import numpy as np
-
 from srs_opt.calibrate.candidates import Candidate
 from srs_opt.calibrate.colour import coloured
 from srs_opt.calibrate.coordinates import Coordinate
 from srs_opt.calibrate.experiment import Experiment, Point
-from srs_opt.calibrate.fit import FAR_OFF, PLAIN, Fit, start_point
+from srs_opt.calibrate.fit import FAR_OFF, start_point
 from srs_opt.calibrate.noise import Noise
-from srs_opt.calibrate.objective import priors, sum_eliminated
 from srs_opt.calibrate.slow import smooth_part
-from srs_opt.discrepancy.detect import detect, project, with_shared
 from srs_opt.discrepancy.diagnostics import Diagnostics, explainable, explained, needed_gain
+from srs_opt.discrepancy.examine import examined, linearised, screened_of
 from srs_opt.discrepancy.functions import ResidualFunctions
 from srs_opt.discrepancy.hypothesis import (
     ITERATIONS,
@@ -28,8 +25,8 @@ from srs_opt.discrepancy.hypothesis import (
     left_of,
     stuck,
 )
-from srs_opt.discrepancy.promising import promising
-from srs_opt.discrepancy.screen import Linearisation, Score, expected_start, screen
+from srs_opt.discrepancy.promising import akin, promising
+from srs_opt.discrepancy.screen import Score, expected_start, screen
 from srs_opt.discrepancy.split import brief_name
 from srs_opt.errors import NoAnswerError
 from srs_opt.measurement.records import Trial
@@ -50,6 +47,8 @@ HOPELESS = 0.1  # share of the gap that the best known effects leave, from which
 # the same flexibility between 50 and 500 1/(N m^2), a tenth takes twice the iterations
 LEAP = 0.35
 NEARER = 0.2  # of the size that slopes promise, from which a refit that got lost is begun again
+# refits with the best of the screen before one with a bending body, which costs as much as three of others
+BEFORE_BENDING = 2
 FIRM = 10.0  # standard deviations from zero at which an effect is not superfluous, without a refit
 # deviance behind the best, and number, of sets that are fitted again when the noise turns out another
 REFITTED, MOST_REFITTED = 60.0, 5
@@ -86,9 +85,11 @@ class Search:
         self.seed = seed
         self.report = report or (lambda message: None)
         self.quick = tuple(quick) or self.trials
+        self.screened = screened_of(self.trials, self.quick)
         self.deepest = DEEPEST
         self._fits: dict[tuple[frozenset[str], bool], Hypothesis] = {}
         self._earlier: list[Hypothesis] = []  # under another noise
+        self._examined: Diagnostics | None = None  # last
 
     @property
     def fitted(self) -> list[Hypothesis]:
@@ -167,7 +168,7 @@ class Search:
         self.report(f"noise: {noise.in_words}")
         self._earlier += self.fitted
         self.experiment = self.experiment.with_noise(noise)
-        self._fits = {}
+        self._fits, self._examined = {}, None
         return self.fit(hypothesis.candidates, hypothesis.fit.point) or hypothesis
 
     def again(self, hypothesis: Hypothesis) -> Hypothesis:
@@ -179,24 +180,14 @@ class Search:
 
         With `stale` the slopes of the last examination serve, if it was of the same effects.
         """
-        fit = hypothesis.fit
-        lin = self._linearise(fit, stale=stale)
-        groups = self.functions.groups()
-        size, columns = len(lin.coordinates), next(iter(lin.equations.values())).raw.shape[0] - 1
-        total = sum_eliminated(lin.equations, 1.0)
-        precision, offset = priors(lin.coordinates[: lin.fitted], lin.point)
-        score, covariance = project(total, range(lin.fitted), range(lin.fitted, columns), precision, offset)
+        known = self._examined
+        if known is not None and known.hypothesis is hypothesis:
+            return known
+        about = self.trials, self.screened, self.functions
+        lin = linearised(self.experiment, hypothesis, self.candidates, *about, stale=stale)
         shared = self.functions.repeated_sd(self.experiment.noise)
-        shared = np.append(np.zeros(size - lin.fitted), shared)
-        covariance = with_shared(covariance, shared)
-        further = [[lin.column(c.name) - lin.fitted for c in k.sizes] for k in self.candidates]
-        tested = [g for g in further if min(g) >= 0]
-        start = size - lin.fitted
-        families = [[start + k for k in g.columns] for g in groups] + tested
-        serial = np.array([g.serial for g in lin.equations.values() if g.scattered])
-        rng = np.random.default_rng([self.seed, 17])
-        detection = detect(score, covariance, families, serial, rng)
-        return Diagnostics(hypothesis, lin, detection, groups, tuple(screen(lin, self.candidates)))
+        self._examined = examined(lin, hypothesis, self.candidates, self.functions, shared, self.seed)
+        return self._examined
 
     def noise_aware(self, diagnostics: Diagnostics) -> Diagnostics:
         """Return a hypothesis examined anew under smooth errors, if small ones explain what it leaves."""
@@ -204,7 +195,7 @@ class Search:
         if diagnostics.adequate or now.smooth or lin.variance_inflation > FAR_OFF:
             return diagnostics
         amplitudes = self.functions.amplitudes(self.trials, len(lin.coordinates))
-        noise = smooth_part(now, lin.equations, amplitudes, lin.coordinates, lin.point)
+        noise = smooth_part(now, lin.telling, amplitudes, lin.coordinates, lin.point)
         if noise == now:
             return diagnostics
         found = self._under(noise, diagnostics.hypothesis)
@@ -216,17 +207,6 @@ class Search:
         for h in [e for e in earlier if cost(e) < cost(earlier[0]) + REFITTED]:
             self.again(h)
         return self.fitted
-
-    def _linearise(self, fit: Fit, *, stale: bool) -> Linearisation:
-        names = {c.name for c in fit.coordinates}
-        others = [c for k in self.candidates for c in k.sizes if c.name not in names]
-        coordinates = (*fit.coordinates, *others)
-        point = Point({**{c.name: 0.0 for c in others}, **fit.point.values}, fit.point.scatter)
-        rough = fit.variance_inflation > PLAIN
-        equations = self.experiment.normal_equations(
-            point, coordinates, self.trials, self.functions, rough=rough, stale=stale
-        )
-        return Linearisation(coordinates, len(fit.coordinates), point, equations, fit.variance_inflation)
 
     def significant(self, score: Score) -> bool:
         """Whether a gain is too large for chance among all candidates."""
@@ -330,10 +310,18 @@ class Search:
         return math.inf if tried is None else cost(tried)
 
     def _refit(self, current: Diagnostics, proposals: list[Score], most: int) -> Hypothesis | None:
-        """Refit proposals on the start of a few trials, best first; return the best fit to all of them."""
+        """Refit proposals on the start of a few trials, best first; return the best fit to all of them.
+
+        Once one explains the data, only those that act alike can be its rivals.
+        """
         found: list[Hypothesis] = []
         have = current.hypothesis.candidates
-        for score in proposals[: 2 * most]:
+        explains: Hypothesis | None = None
+        bending = [s for s in proposals if s.candidate.form.effect.bends]
+        others = [s for s in proposals if s not in bending][: 2 * most - len(bending)]
+        for score in (*others[:BEFORE_BENDING], *bending, *others[BEFORE_BENDING:]):
+            if explains is not None and not akin(self.examine(explains), score.candidate):
+                continue
             start = self._start(current, score)
             beat = min((h.deviance for h in found), default=math.inf)
             hypothesis = self.try_out((*have, score.candidate), start, beat)
@@ -342,6 +330,8 @@ class Search:
                 hypothesis = self.try_out((*have, score.candidate), nearer, beat)
             if hypothesis is not None:
                 found.append(hypothesis)
+                if hypothesis.fit.variance_inflation == 1 and explains is None and self.quick == self.trials:
+                    explains = hypothesis
             settled = found and min(h.fit.variance_inflation for h in found) == 1
             if len(found) >= most and (settled or len(found) >= 2 * most):
                 break

@@ -67,7 +67,7 @@ def visible(
     them.
     """
     lin = null.linearisation
-    total = sum_eliminated(lin.equations, lin.variance_inflation)
+    total = sum_eliminated(lin.telling, lin.variance_inflation)
     precision, _ = priors(lin.coordinates, lin.point)
     inverse, left = projected(total, lin.fitted, precision, RANK)
     free = {c.name: k for k, c in enumerate(lin.coordinates[lin.fitted :])}
@@ -86,7 +86,7 @@ def visible(
         if seen:
             sizes[effect] = max(seen, key=lambda pair: pair[0] / pair[1].sizes[0].typical)
     point = null.hypothesis.fit.point
-    count = sum(g.count for g in lin.equations.values())
+    count = sum(g.count for g in lin.telling.values())
     needed = max(_needed(c, len(null.scores)) for c in candidates) if candidates else 0.0
     seen_m = max(
         needed * experiment.sd_m * float(np.sqrt(lin.variance_inflation / count)), settings.negligible_m

@@ -65,13 +65,12 @@ def mend_labels(chain: Chain, markers_m: Array) -> MendedLabels:
 
 
 def _suspicious(chain: Chain, points: Array) -> bool:
-    """Whether any marker jumps between sightings, or neighbours lie too far apart."""
+    """Whether any marker jumps between sightings, as those do whose labels are exchanged in some frames."""
     for marker in range(points.shape[1]):
         seen = points[np.isfinite(points[:, marker, 0]), marker]
         if len(seen) and (np.linalg.norm(np.diff(seen, axis=0), axis=1) > NEAR * chain.pitch_m).any():
             return True
-    chords = np.linalg.norm(np.diff(points, axis=1), axis=2)
-    return bool((chords > SLACK * chain.spacing_m).any())  # not so where one of two was lost
+    return False
 
 
 def fits_chain(chain: Chain, frame: Array) -> bool:
