@@ -30,6 +30,7 @@ from srs_opt.effects.plugins import registered
 from srs_opt.errors import InputError
 from srs_opt.files import temporary_folder
 from srs_opt.interrupts import signals_deferred
+from srs_opt.simulate.parts import in_parts
 
 FLAGS = ("-O1", "-fPIC", "-shared", "-fno-math-errno")
 
@@ -213,4 +214,4 @@ def _casadi_source(function: ca.Function, name: str) -> str:
     names_out = [function.name_out(i) for i in range(function.n_out())]
     generator = ca.CodeGenerator(f"{name}.c")
     generator.add(ca.Function(name, inputs, function.call(inputs), names_in, names_out))
-    return str(generator.dump())
+    return in_parts(str(generator.dump()))
