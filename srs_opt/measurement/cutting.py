@@ -10,9 +10,10 @@ import numpy as np
 from srs_opt.errors import InputError
 from srs_opt.geometry import rotation_matrix, wrapped
 from srs_opt.measurement.chain import Chain
-from srs_opt.measurement.onset import Gait, Onset
+from srs_opt.measurement.onset import Onset
 from srs_opt.measurement.records import Array, Trial
 from srs_opt.measurement.takes.take import Take
+from srs_opt.measurement.valve_wave import ValveWave
 from srs_opt.problem import Report
 from srs_opt.table import Row
 
@@ -26,7 +27,7 @@ def cut_trial(
     chain: Chain,
     tracks: Array,
     onset: Onset,
-    gait: Gait,
+    gait: ValveWave,
 ) -> Trial:
     """Cut the trial out of the take: from the valves' start, tail at the origin, room axes kept.
 

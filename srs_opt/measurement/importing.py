@@ -21,16 +21,16 @@ from srs_opt.measurement.labels import follow, take
 from srs_opt.measurement.noise import noise_sd
 from srs_opt.measurement.onset import (
     QUIET_FRAMES,
-    Gait,
     Onset,
     find_onset,
     first_motion,
-    run_in_s,
 )
 from srs_opt.measurement.read import parse_schedule
 from srs_opt.measurement.records import KINDS, Array, Bench, Check, DataSet, Schedule, Trial
+from srs_opt.measurement.run_in import run_in_s
 from srs_opt.measurement.spots import Spots
 from srs_opt.measurement.takes.take import Take
+from srs_opt.measurement.valve_wave import ValveWave
 from srs_opt.problem import Report
 from srs_opt.robot import Robot
 from srs_opt.table import Row, first_error, read_table
@@ -228,7 +228,7 @@ def import_trial(
     if schedule is not None:
         values[0] = 1 / schedule.period_s
     gait = _seen_gait(
-        Gait(values[0], values[1], values[2], values[3], schedule), source.time_s, tracks, warnings
+        ValveWave(values[0], values[1], values[2], values[3], schedule), source.time_s, tracks, warnings
     )
     backwards = head_first(
         chain,
@@ -327,7 +327,7 @@ def _valve_start(
     robot: Robot,
     tracks: Array,
     options: ImportOptions,
-    gait: Gait,
+    gait: ValveWave,
     warnings: list[str],
 ) -> Onset:
     """Return when the valves started, or, where a take begins in motion, may be taken to have started."""
@@ -357,7 +357,7 @@ def _valve_start(
     return onset
 
 
-def _seen_gait(gait: Gait, time_s: Array, tracks: Array, warnings: list[str]) -> Gait:
+def _seen_gait(gait: ValveWave, time_s: Array, tracks: Array, warnings: list[str]) -> ValveWave:
     """Return the gait at the frequency that the bends show, where it is not the one listed."""
     if gait.frequency_hz <= 0:
         return gait

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from srs_opt.errors import NoAnswerError
 from srs_opt.measurement.chain import Chain, chain_of, marker_positions
 from srs_opt.measurement.noise import noise_sd
-from srs_opt.measurement.records import Array, Schedule
+from srs_opt.measurement.records import Array
+from srs_opt.measurement.run_in import likely_start_s, run_in_s
 from srs_opt.measurement.spots import Spots
-from srs_opt.model.actuator_law import step_response
+from srs_opt.measurement.valve_wave import ValveWave, first_curvatures
 from srs_opt.robot import Robot
 
 THRESHOLD = 6.0
@@ -23,7 +24,6 @@ CYCLES = 2.0
 MOST_LEFT = 0.35
 DRIFT = 8.0  # standard deviations of chi squared; rest on a shaking table stays below
 PHASES = 24  # tried per cycle
-LEAST_RUN_IN_S, LEAST_RUN_IN_CYCLES = 1.5, 3  # after which a gait has forgotten how it began
 
 
 @dataclass(frozen=True)
@@ -31,54 +31,19 @@ class Onset:
     """Start of the valves on the camera's clock; a dead time of the valves is part of it.
 
     `doubt` says why the start is bracketed by the first motion; empty when the fit stands. `moving` tells
-    that the take begins in mid-gait: then the start is that of a run-in of whole cycles before the take.
+    that the take begins in mid-gait: then the start is that of a run-in of whole cycles before the take, or a
+    later one. `left` is the share of the shapes' change that the fit leaves.
     """
 
     time_s: float
     sd_s: float
     doubt: str = ""
     moving: bool = False
-
-
-@dataclass(frozen=True)
-class Gait:
-    """The valve wave (13) of a trial."""
-
-    frequency_hz: float
-    pressure_kpa: float
-    offset: float
-    phase_lag_rad: float
-    schedule: Schedule | None = None
-
-    def states(self, segment: int, time_s: Array) -> Array:
-        """Return S (+1 or -1) of `segment`."""
-        if self.schedule is not None:
-            return self.schedule.state(segment, time_s)
-        wave = np.sin(2 * np.pi * self.frequency_hz * time_s + self.phase_lag_rad * segment)
-        return np.where(wave + self.offset > 0, 1.0, -1.0)
-
-
-def first_curvatures(robot: Robot, gait: Gait, time_s: Array, slowness: float = 1.0) -> Array:
-    """Return the curvatures that the valve wave gives from rest at time 0, shape (T, N-1).
-
-    Sums of step responses (14), one per switch, up to the end of `time_s`; `slowness` multiplies both time
-    constants.
-    """
-    total = robot.tau1_s + robot.tau2_s
-    s, q = slowness * total / 2, ((robot.tau1_s - robot.tau2_s) / total) ** 2
-    fine = np.arange(1e-6, max(float(time_s[-1]), 1e-3), 2e-4)
-    columns = []
-    for segment in range(1, robot.links):
-        state = gait.states(segment, fine)
-        column = state[0] * step_response(time_s, s, q)
-        for k in np.flatnonzero(np.diff(state)):
-            column = column + (state[k + 1] - state[k]) * step_response(time_s - fine[k], s, q)
-        columns.append(column)
-    return np.column_stack(columns) * robot.curvature_per_pressure_1_m_kpa * gait.pressure_kpa
+    left: float = 0.0
 
 
 def find_onset(
-    robot: Robot, gait: Gait, time_s: Array, markers_m: Array, spots: Spots | None = None
+    robot: Robot, wave: ValveWave, time_s: Array, markers_m: Array, spots: Spots | None = None
 ) -> Onset:
     """Fit the shapes of the first cycles with those that the valve wave gives, whatever way the robot moves.
 
@@ -91,7 +56,7 @@ def find_onset(
     ----------
     robot : Robot
         Its geometry, C0, tau_1 and tau_2.
-    gait : Gait
+    wave : ValveWave
         What the valves were told to do.
     time_s : ndarray, shape (T,)
     markers_m : ndarray, shape (T, M, 2)
@@ -104,25 +69,29 @@ def find_onset(
     NoAnswerError
         If the robot never moves or has no valve wave.
     """
-    if not gait.frequency_hz > 0:
+    if not wave.frequency_hz > 0:
         raise NoAnswerError("without a valve wave the start cannot be found: give valve_start_s by hand")
     moving = first_motion(markers_m.reshape(len(markers_m), -1), noise_sd(markers_m))
     if moving is None:
         raise NoAnswerError("the markers never move: give valve_start_s by hand")
     if moving < QUIET_FRAMES:
-        return find_phase(robot, gait, time_s, markers_m, spots)
+        return find_phase(robot, wave, time_s, markers_m, spots)
     if _drifts(markers_m.reshape(len(markers_m), -1)[: max(moving // 2, QUIET_FRAMES)], noise_sd(markers_m)):
-        running = find_phase(robot, gait, time_s, markers_m, spots)
+        running = find_phase(robot, wave, time_s, markers_m, spots)
         if not running.doubt:
             return running
     centre, settle = float(time_s[moving]), robot.tau1_s + robot.tau2_s
-    window = (time_s > centre - 2 * settle) & (time_s < centre + CYCLES / gait.frequency_hz)
+    window = (time_s > centre - 2 * settle) & (time_s < centre + CYCLES / wave.frequency_hz)
     time, points = time_s[window], markers_m[window]
     low, high = max(centre - settle, float(time_s[0])), centre + float(np.median(np.diff(time_s)))
     grid = np.linspace(low, centre, 25)
-    found = _fitted(robot, gait, time, points, chain_of(robot, spots), grid, (low, high))
+    found = _fitted(robot, wave, time, points, chain_of(robot, spots), grid, (low, high))
     bracket = float((high - low) / np.sqrt(12))
     if found.left > MOST_LEFT or found.edge:
+        # the start may lie before the first frame, and what was taken for rest be the slow first bend
+        running = find_phase(robot, wave, time_s, markers_m, spots)
+        if running.left < min(found.left, MOST_LEFT):
+            return running
         reason = (
             found.complaint
             if found.left > MOST_LEFT
@@ -132,32 +101,38 @@ def find_onset(
     return Onset(found.start_s, min(found.sd_s, bracket))
 
 
-def run_in_s(frequency_hz: float) -> float:
-    """Return the time of whole cycles after which a gait has forgotten how it began."""
-    cycles = max(LEAST_RUN_IN_CYCLES, int(np.ceil(LEAST_RUN_IN_S * frequency_hz)))
-    return cycles / frequency_hz
-
-
 def find_phase(
-    robot: Robot, gait: Gait, time_s: Array, markers_m: Array, spots: Spots | None = None
+    robot: Robot, wave: ValveWave, time_s: Array, markers_m: Array, spots: Spots | None = None
 ) -> Onset:
-    """Return when valves that ran in for whole cycles (`run_in_s`) started, for a take that begins in motion.
+    """Return when the valves started, for a take that begins in motion.
 
-    As `find_onset` fits the first cycles' shapes; every phase of the wave is tried.
+    As `find_onset` fits the first cycles' shapes; every phase of the wave is tried, and that it has only just
+    begun. Of the starts with the same phase, the first is whole cycles (`run_in_s`) before the take; a later
+    one is taken where the body's first cycles say so.
     """
-    period = 1 / gait.frequency_hz
+    period = 1 / wave.frequency_hz
     first = float(time_s[0])
     window = time_s < first + 2 * CYCLES * period
-    latest = first - run_in_s(gait.frequency_hz)
-    grid = latest - period * np.arange(PHASES) / PHASES
-    bounds = (latest - 1.5 * period, latest + 0.5 * period)
+    run_in = run_in_s(wave.frequency_hz)
     chain = chain_of(robot, spots)
-    found = _fitted(robot, gait, time_s[window], markers_m[window], chain, grid, bounds)
-    start = latest - (latest - found.start_s) % period
+
+    def fitted(latest: float, low: float, high: float) -> _Fitted:
+        grid = latest - period * np.arange(PHASES) / PHASES
+        return _fitted(robot, wave, time_s[window], markers_m[window], chain, grid, (low, high))
+
+    latest = first - run_in
+    running = fitted(latest, latest - 1.5 * period, latest + 0.5 * period)
+    start = latest - (latest - running.start_s) % period
+    just_begun = fitted(first, first - 1.25 * period, first)
+    later = start + period * np.arange(round(run_in / period) + 1)
+    starts = np.append(later[later < just_begun.start_s - period / 2], just_begun.start_s)
+    noise = noise_sd(markers_m)
+    chosen = likely_start_s(robot, wave, time_s, markers_m, spots, noise, starts)
+    found = just_begun if chosen == just_begun.start_s else running
     bracket = float(period / np.sqrt(12))
     if found.left > MOST_LEFT:
-        return Onset(start, bracket, found.complaint, moving=True)
-    return Onset(start, min(found.sd_s, bracket), moving=True)
+        return Onset(chosen, bracket, found.complaint, True, found.left)
+    return Onset(chosen, min(found.sd_s, bracket), "", True, found.left)
 
 
 @dataclass(frozen=True)
@@ -176,7 +151,7 @@ class _Fitted:
 
 def _fitted(
     robot: Robot,
-    gait: Gait,
+    wave: ValveWave,
     time: Array,
     points: Array,
     chain: Chain,
@@ -189,7 +164,7 @@ def _fitted(
     z = points[..., 0] + 1j * points[..., 1]
 
     def gaps(p: Array) -> Array:
-        kappa = p[1] * first_curvatures(robot, gait, time - p[0], p[2])
+        kappa = p[1] * first_curvatures(robot, wave, time - p[0], p[2])
         return _shape_gaps(chain, kappa, z)
 
     low, high = limits

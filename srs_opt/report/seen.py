@@ -16,10 +16,10 @@ from srs_opt.calibrate.noise import noise_of
 from srs_opt.calibrate.rejection import rejection_reason
 from srs_opt.errors import InputError, NoAnswerError
 from srs_opt.measurement.motion import Motion, trial_motion
-from srs_opt.measurement.onset import Gait, first_curvatures
 from srs_opt.measurement.records import Array, DataSet, Trial
 from srs_opt.measurement.shape import shape_from_markers
 from srs_opt.measurement.smooth import Intensity, SmoothShape, smooth_shape
+from srs_opt.measurement.valve_wave import ValveWave, first_curvatures
 from srs_opt.problem import Problem
 from srs_opt.robot import Robot
 
@@ -128,7 +128,7 @@ def _bends(dataset: DataSet, robot: Robot, trial: Trial, intensity: Intensity | 
     seen = smooth_shape(robot, time, points, dataset.marker_sd_m, intensity, trial.spots)
     if trial.applied:
         return Bends(seen, None)
-    gait = Gait(
+    gait = ValveWave(
         trial.frequency_hz, trial.pressure_kpa, trial.offset, trial.phase_lag_rad, schedule=trial.schedule
     )
     return Bends(seen, first_curvatures(robot, gait, time))

@@ -19,9 +19,10 @@ from srs_opt.import_tracks.__main__ import build_parser, run
 from srs_opt.measurement.chain import chain_of
 from srs_opt.measurement.dataset import load_dataset
 from srs_opt.measurement.direction import head_first
-from srs_opt.measurement.onset import Gait, find_onset, first_curvatures
+from srs_opt.measurement.onset import find_onset
 from srs_opt.measurement.takes.formats import read_take
 from srs_opt.measurement.takes.take import ReadSettings
+from srs_opt.measurement.valve_wave import ValveWave, first_curvatures
 from virtual_lab.simulate import run as run_lab
 from virtual_lab.trials import Schedule as LabSchedule
 from virtual_lab.trials import Trial as LabTrial
@@ -220,13 +221,13 @@ def test_head_and_tail_by_the_bends_not_by_the_travel(backwards):
 def test_a_start_that_cannot_be_told_says_so():
     """The wrong gait does not get an onset of 20 ms: the start is bracketed by the first motion."""
     _, points = lab_tracks(offset=0.0)
-    right = find_onset(ROBOT, Gait(1.5, 48, 0.0, math.pi / 2), TIME, points)
+    right = find_onset(ROBOT, ValveWave(1.5, 48, 0.0, math.pi / 2), TIME, points)
     assert not right.doubt
     assert abs(right.time_s - START) < 5 * right.sd_s + 2e-3
-    wrong = find_onset(ROBOT, Gait(1.5, 48, 0.0, math.pi), TIME, points)
+    wrong = find_onset(ROBOT, ValveWave(1.5, 48, 0.0, math.pi), TIME, points)
     assert wrong.doubt or wrong.sd_s > 5 * right.sd_s
     assert abs(wrong.time_s - START) < 4 * wrong.sd_s
-    moved = first_curvatures(ROBOT, Gait(1.5, 48, 0.0, math.pi / 2), np.array([0.0, 0.1]))
+    moved = first_curvatures(ROBOT, ValveWave(1.5, 48, 0.0, math.pi / 2), np.array([0.0, 0.1]))
     assert moved[0].tolist() == [0, 0, 0, 0]
 
 

@@ -12,7 +12,10 @@ from srs_opt.calibrate.model import Model
 from srs_opt.measurement.dataset import load_dataset, write_dataset
 from srs_opt.measurement.frequency import far_frequency, seen_frequency
 from srs_opt.measurement.importing import ImportOptions, import_takes, read_trial_list
+from srs_opt.measurement.onset import find_onset
+from srs_opt.measurement.run_in import run_in_s
 from srs_opt.measurement.takes.take import Take
+from srs_opt.measurement.valve_wave import ValveWave
 from virtual_lab.simulate import run
 from virtual_lab.trials import Trial as LabTrial
 from virtual_lab.truth import Truth
@@ -70,6 +73,31 @@ def test_a_take_that_begins_in_mid_gait_is_explained_to_the_noise(tmp_path, lab)
     assert 0.94 < ratio < 1.06
     # pose and clock are no part of what the coordinates are blamed for
     assert np.isfinite(normal.raw).all()
+
+
+@pytest.mark.parametrize("cut_s", [0.02, 0.1, 0.3, 0.5])
+def test_a_camera_that_starts_a_moment_after_the_valves(lab, cut_s):
+    """The bends tell the phase, the body's slower first cycle that it is the first."""
+    time, points = lab
+    late = time >= cut_s
+    # bench values that are off do not change the answer
+    off = ROBOT.with_values(
+        friction_tangential=1.3 * ROBOT.friction_tangential,
+        friction_normal=0.8 * ROBOT.friction_normal,
+        curvature_per_pressure_1_m_kpa=1.1 * ROBOT.curvature_per_pressure_1_m_kpa,
+    )
+    found = find_onset(off, ValveWave(1.514, 48.0, 0.2, np.pi / 2), time[late], points[late])
+    assert found.moving and not found.doubt
+    assert abs(found.time_s) < 0.003
+
+
+def test_a_run_in_that_left_no_trace_is_whole_cycles(lab):
+    time, points = lab
+    late = time >= 4.0
+    found = find_onset(ROBOT, ValveWave(1.514, 48.0, 0.2, np.pi / 2), time[late], points[late])
+    before = 4.0 - found.time_s
+    assert run_in_s(1.514) - 0.01 < before < run_in_s(1.514) + 1 / 1.514
+    assert found.time_s * 1.514 == pytest.approx(round(found.time_s * 1.514), abs=0.01)
 
 
 def test_the_data_set_keeps_what_begins_in_motion(tmp_path, lab):
