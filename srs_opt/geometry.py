@@ -42,9 +42,9 @@ def rotation_matrix(angle: float) -> np.ndarray:
 
 
 def compose(frame: np.ndarray, local: np.ndarray) -> Array:
-    """Return poses (..., 3) in the room that are `local` in a frame with pose (3,)."""
-    x, y = rotate(frame[2], local[..., 0], local[..., 1])
-    return np.stack([frame[0] + x, frame[1] + y, frame[2] + local[..., 2]], axis=-1)
+    """Return poses (..., 3) in the room that are `local` in a frame with pose (3,), or in several of them."""
+    x, y = rotate(frame[..., 2], local[..., 0], local[..., 1])
+    return np.stack([frame[..., 0] + x, frame[..., 1] + y, frame[..., 2] + local[..., 2]], axis=-1)
 
 
 def relative(frame: np.ndarray, pose: np.ndarray) -> Array:

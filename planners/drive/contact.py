@@ -80,5 +80,5 @@ class BodyWatch:
         room = self._body.estimate(lines) - self._body.field.error_m
         close = room < self._exact_below_m
         if close.any():
-            room[close] = self._body.exact(lines[close])
+            room[close] = self._body.exact(lines[close], room[close] + self._body.field.error_m)
         return room

@@ -118,6 +118,36 @@ class MotionTable:
         local, after = ((1 - weight) * t[:, low] + weight * t[:, low + 1] for t in tables)
         return Motion(compose(np.array([x, y, heading]), local), after)
 
+    def ends(self, start: Array, before: Sequence[int], speed_m_s: Sequence[float]) -> tuple[Array, Array]:
+        """Return where a cycle of each gait ends from several states.
+
+        Parameters
+        ----------
+        start : array (n, 3)
+        before : sequence of int (n,)
+        speed_m_s : sequence of float (n,)
+
+        Returns
+        -------
+        pose : array (n, gaits, 3)
+        speed_m_s : array (n, gaits)
+            Forward.
+        """
+        rows, low, weight = self._levels(before, speed_m_s)
+        local, after = (
+            _between(t[rows, :, low], t[rows, :, low + 1], weight)
+            for t in (self.pose[..., -1, :], self.speed_after_m_s)
+        )
+        return compose(start[:, None], local), after
+
+    def poses(
+        self, start: Array, before: Sequence[int], speed_m_s: Sequence[float], now: NDArray[np.int64]
+    ) -> Array:
+        """Return the poses (n, SAMPLES + 1, 3) over cycles of gaits `now` (n,), each from its own state."""
+        rows, low, weight = self._levels(before, speed_m_s)
+        local = _between(self.pose[rows, now, low], self.pose[rows, now, low + 1], weight)
+        return compose(start[:, None], local)
+
     def move_one(
         self, x: float, y: float, heading: float, before: int, speed_m_s: float, now: int
     ) -> tuple[Array, float]:
@@ -142,6 +172,14 @@ class MotionTable:
         low = min(max(low, 0), levels.size - 2)
         weight = (speed_m_s - levels[low]) / (levels[low + 1] - levels[low])
         return low, float(min(max(weight, -0.5), 1.5))
+
+    def _levels(
+        self, before: Sequence[int], speed_m_s: Sequence[float]
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float32]]:
+        """Return rows, levels below the speeds and the weights of the levels above, (n,) each."""
+        rows = self.rows(before)
+        low, weight = zip(*(self._level(row, speed) for row, speed in zip(rows, speed_m_s)))
+        return np.array(rows), np.array(low), np.array(weight, dtype=np.float32)
 
     def bodies(self, before: int, now: NDArray[np.int64] | slice, pose: Array) -> Array:
         """Return centre lines in the room, (gaits, SAMPLES + 1, points, 2), for poses of the same gaits."""
@@ -183,3 +221,9 @@ def courses(steady: Array, still_m: float) -> Array:
     backwards = dx < 0
     chord = np.arctan2(np.where(backwards, -dy, dy), np.where(backwards, -dx, dx))
     return np.where(np.hypot(dx, dy) > still_m, chord - turn / 2, 0.0)
+
+
+def _between(low: Array, high: Array, weight: NDArray[np.float32]) -> Array:
+    """Interpolate between two levels of several entries (n, ...)."""
+    weight = weight.reshape(-1, *[1] * (low.ndim - 1))
+    return np.asarray((1 - weight) * low + weight * high)

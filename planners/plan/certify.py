@@ -270,7 +270,7 @@ def clearances(problem: Problem, lines: Array, limit_m: float | None = None) -> 
     room = problem.body.estimate(lines) - problem.field.error_m
     close = room < limit_m
     if close.any():
-        room[close] = problem.body.exact(lines[close])
+        room[close] = problem.body.exact(lines[close], room[close] + problem.field.error_m)
     return room
 
 

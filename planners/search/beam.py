@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from planners.motion.table import SAMPLES
 from planners.search.costmap import BLOCKED_S
@@ -20,6 +21,7 @@ from planners.search.problem import Cycle, Problem
 from planners.search.tree import Root, Step, Tree, arrival_index, at_rest, cell_of
 from srs_opt.model.state import FORWARD, HEADING, PLACE, X, Y
 
+Array = NDArray[np.float64]
 TOGETHER = 8  # cycles simulated in one batch
 FIRST_LOOK = 32  # gaits whose bodies are looked at first, most promising first
 NARROW, WIDE, WIDTH_TIMES_S = 12, 32, 200.0  # widths of beams, and width times seconds to go
@@ -68,6 +70,15 @@ class _Expansion(NamedTuple):
     spent: float
 
 
+class _Begins(NamedTuple):
+    """States that cycles begin from: node, pose (n, 3), gait before and forward speed of each."""
+
+    node: list[int]
+    pose: Array
+    before: list[int]
+    speed_m_s: list[float]
+
+
 class BeamSearch:
     """A beam search, advanced until it arrives or has no state left."""
 
@@ -101,8 +112,7 @@ class BeamSearch:
         """Advance the beam by about `expansions` states; return the way to the goal when it has ended."""
         last = self.expanded + expansions
         while self._front and self.expanded < last:
-            ranked = sorted(e for node in self._front for e in self._expansions(node))
-            self._front = self._chosen(ranked)
+            self._front = self._chosen(sorted(self._expansions(self._front)))
             nearest = self._to_go_s(self._front)
             self._stalled = 0 if nearest < self._nearest else self._stalled + 1
             self._nearest = min(nearest, self._nearest)
@@ -119,31 +129,49 @@ class BeamSearch:
         places = np.array([self._tree.cycle[node].state[PLACE] for node in nodes])
         return float(self.problem.to_goal.at(places).min())
 
-    def _expansions(self, node: int) -> list[_Expansion]:
-        """Return the cycles that may follow a state, by the motion table."""
-        self.expanded += 1
+    def _expansions(self, nodes: list[int]) -> list[_Expansion]:
+        """Return the cycles that may follow some states, by the motion table."""
+        self.expanded += len(nodes)
+        problem, s, motion, tree = self.problem, self.settings, self.problem.motion, self._tree
+        begin = _Begins(
+            nodes,
+            np.array([tree.cycle[node].state[[X, Y, HEADING]] for node in nodes]),
+            [tree.gait[node] for node in nodes],
+            [float(tree.cycle[node].state[FORWARD]) for node in nodes],
+        )
+        end, speed_m_s = motion.ends(begin.pose, begin.before, begin.speed_m_s)
+        left = cost_to_go(problem, end, speed_m_s, s.by_heading)
+        orders = []
+        for mine, before in zip(left, begin.before):
+            order = np.argsort(mine + motion.period_s, kind="stable")
+            orders.append(order[(mine[order] < BLOCKED_S / 2) & motion.may_follow(before)[order]])
+        found = self._fitting(begin, list(range(len(nodes))), [order[:FIRST_LOOK] for order in orders], left)
+        few = [k for k, mine in enumerate(found) if len(mine) < s.branching]
+        more = self._fitting(begin, few, [orders[k][FIRST_LOOK:] for k in few], left)
+        return [expansion for mine in (*found, *more) for expansion in mine]
+
+    def _fitting(
+        self, begin: _Begins, which: list[int], gaits: list[NDArray[np.int64]], left: Array
+    ) -> list[list[_Expansion]]:
+        """Return for some of the states, and gaits of each, the cycles whose bodies are not in a wall."""
+        found: list[list[_Expansion]] = [[] for _ in which]
+        if not sum(map(len, gaits)):
+            return found
         problem, s, motion = self.problem, self.settings, self.problem.motion
-        state, before = self._tree.cycle[node].state, self._tree.gait[node]
-        move = motion.move(state[X], state[Y], state[HEADING], before, state[FORWARD])
-        left = cost_to_go(problem, move.pose[:, -1], move.speed_m_s, s.by_heading)
-        order = np.argsort(left + motion.period_s, kind="stable")
-        order = order[(left[order] < BLOCKED_S / 2) & motion.may_follow(before)[order]]
-        expansions: list[_Expansion] = []
-        for gaits in (order[:FIRST_LOOK], order[FIRST_LOOK:]):
-            lines = motion_lines(problem, before, move.pose, gaits)
-            room = problem.body.estimate(lines).min(axis=1, initial=math.inf)
-            spare = room - problem.margin_m
-            fits = spare > -problem.field.error_m
-            tight = np.clip(1 - spare / motion.body_width_m, 0.0, 1.0)
-            spent = self._tree.spent[node] + problem.cost_model.of_cycles(gaits, move.pose[gaits], spare)
-            spent = spent + s.change_s * (gaits != before) + s.air_s * tight
-            rank = spent + left[gaits]
-            expansions += [
-                _Expansion(float(rank[k]), node, int(gaits[k]), float(spent[k])) for k in np.flatnonzero(fits)
-            ]
-            if len(expansions) >= s.branching:
-                break
-        return expansions
+        owner = np.repeat(np.arange(len(which)), [len(mine) for mine in gaits])
+        state, now = np.array(which)[owner], np.concatenate(gaits)
+        before = [begin.before[k] for k in state]
+        pose = motion.poses(begin.pose[state], before, [begin.speed_m_s[k] for k in state], now)
+        spare = problem.body.estimate(motion_lines(problem, before, pose, now)).min(axis=1) - problem.margin_m
+        tight = np.clip(1 - spare / motion.body_width_m, 0.0, 1.0)
+        spent = np.array([self._tree.spent[begin.node[k]] for k in which])[owner]
+        spent = spent + problem.cost_model.of_cycles(now, pose, spare)
+        spent = spent + s.change_s * (now != np.array(before)) + s.air_s * tight
+        rank = spent + left[state, now]
+        for k in np.flatnonzero(spare > -problem.field.error_m):
+            node = begin.node[state[k]]
+            found[owner[k]].append(_Expansion(float(rank[k]), node, int(now[k]), float(spent[k])))
+        return found
 
     def _chosen(self, expansions: list[_Expansion]) -> list[int]:
         """Simulate expansions, best first, until the front is full again."""
@@ -158,9 +186,16 @@ class BeamSearch:
             self.simulated += len(batch)
             tree = self._tree
             begins = [(tree.cycle[o.parent].state, tree.gait[o.parent], o.gait) for o in batch]
-            cycles = self.problem.simulate_all(begins)
-            for expansion, cycle in zip(batch, cycles):
-                node = None if cycle is None else self._taken(expansion, cycle)
+            done = [
+                (expansion, cycle)
+                for expansion, cycle in zip(batch, self.problem.simulate_all(begins))
+                if cycle is not None
+            ]
+            if not done:
+                continue
+            rooms = self.problem.body.estimate(np.stack([cycle.lines for _, cycle in done]))
+            for (expansion, cycle), room in zip(done, rooms):
+                node = self._taken(expansion, cycle, room)
                 if node is not None:
                     taken[expansion.parent] = taken.get(expansion.parent, 0) + 1
                     front.append(node)
@@ -168,17 +203,19 @@ class BeamSearch:
                 break
         return front[: self._width]
 
-    def _taken(self, expansion: _Expansion, cycle: Cycle) -> int | None:
-        """Keep a simulated cycle if it is clear and the cheapest to come here; None too where it arrives."""
+    def _taken(self, expansion: _Expansion, cycle: Cycle, room: Array) -> int | None:
+        """Keep a simulated cycle if it is clear and the cheapest to come here; None too where it arrives.
+
+        `room` (SAMPLES + 1,) is the estimated clearance of its bodies.
+        """
         s, state, length = self.settings, cycle.state, self.problem.robot.length_m
         course = state[HEADING] + self.problem.motion.course[expansion.gait]
         key = cell_of(state, course, s.cell * length, s.course_rad, s.speed * length)
         if self._cheapest.get(key, math.inf) <= expansion.spent:
             return None
         slack = self.root_slack_m if expansion.parent == 0 else s.slack * length
-        if not self.problem.body.keeps_margin(
-            cycle.lines, slack + (cycle.tube_m if expansion.parent else 0.0)
-        ):
+        slack += cycle.tube_m if expansion.parent else 0.0
+        if not self.problem.body.keeps_margin(cycle.lines, slack, room):
             return None
         self._cheapest[key] = expansion.spent
         node = self._tree.add(expansion.parent, expansion.gait, expansion.spent, cycle)

@@ -47,19 +47,24 @@ class BodyClearance:
         clearance_m: Array = self.field.clearance(lines).min(axis=-1) - self.half_width_m
         return clearance_m
 
-    def exact(self, lines: Array) -> Array:
+    def exact(self, lines: Array, roughly: Array | None = None) -> Array:
         """Return the exact clearance (m) of each body, (n,), for centre lines (n, points, 2).
 
-        Bodies that touch or overlap walls by more than half their width answer minus half the width.
+        Bodies that touch or overlap walls by more than half their width answer minus half the width. Their
+        `estimate` may be given where it is known.
         """
-        upper = self.field.clearance(lines).min(axis=-1) + self.field.error_m + UNSURE_M
+        roughly = self.estimate(lines) if roughly is None else roughly
+        upper = roughly + self.half_width_m + self.field.error_m + UNSURE_M
         return self.maze.clearances(shapely.linestrings(lines), upper) - self.half_width_m
 
-    def keeps_margin(self, lines: Array, slack_m: float = 0.0) -> bool:
-        """Whether every body of (n, points, 2) keeps the margin and `slack_m` more."""
+    def keeps_margin(self, lines: Array, slack_m: float = 0.0, roughly: Array | None = None) -> bool:
+        """Whether every body of (n, points, 2) keeps the margin and `slack_m` more.
+
+        Their `estimate` may be given where it is known.
+        """
         wanted = self.margin_m + slack_m
-        roughly = self.estimate(lines)
+        roughly = self.estimate(lines) if roughly is None else roughly
         if roughly.min() < wanted - self.field.error_m:
             return False
         close = roughly < wanted + self.field.error_m
-        return not close.any() or bool(self.exact(lines[close]).min() >= wanted)
+        return not close.any() or bool(self.exact(lines[close], roughly[close]).min() >= wanted)

@@ -102,9 +102,12 @@ def cost_map(
         a = (slice(max(0, -di), rows - max(0, di)), slice(max(0, -dj), columns - max(0, dj)))
         b = (slice(max(0, di), rows + min(0, di)), slice(max(0, dj), columns + min(0, dj)))
         ok = free[a] & free[b]
+        # an interpolated distance changes by the square root of 2 per metre at most: elsewhere it is clear
+        near = np.minimum(room[a], room[b]) < blocked + math.hypot(di, dj) * spacing
         for part in (1 / 3, 2 / 3) if abs(di) + abs(dj) > 2 else (1 / 2,):
-            between = (1 - part) * nodes[a][ok] + part * nodes[b][ok]
-            ok[ok] = field.clearance(between) > blocked
+            doubt = ok & near
+            between = (1 - part) * nodes[a][doubt] + part * nodes[b][doubt]
+            ok[doubt] = field.clearance(between) > blocked
         clear[..., step][a] = ok
     away = goal.distance(nodes).ravel()
     sources = np.flatnonzero((away <= 0) & free.ravel())

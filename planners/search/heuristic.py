@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,10 +22,10 @@ def cost_to_go(problem: Problem, end: Array, speed_m_s: Array, by_heading: bool 
     Parameters
     ----------
     problem : Problem
-    end : array (gaits, 3)
+    end : array (..., gaits, 3)
         Poses; the cost is the mean of the ways from the middle, from half-way to the head and, twice, from
         the head: it is the first to know that a cycle turns the right way.
-    speed_m_s : array (gaits,)
+    speed_m_s : array (..., gaits)
         Forward speeds there. Accelerating takes several cycles, so slow states get a start-up cost.
     by_heading : bool
         Estimate by place, course and direction of travel (`heading_map`) instead of by place alone.
@@ -39,18 +41,18 @@ def cost_to_go(problem: Problem, end: Array, speed_m_s: Array, by_heading: bool 
 
 def _by_heading(problem: Problem, end: Array) -> tuple[Array, Array]:
     """Return the cost of what is left, and whether there is a way at all (by place)."""
-    course = end[:, 2] + problem.motion.course[:-1]
-    middle = problem.to_goal.at(end[:, :2])
-    left = problem.to_goal_by_heading.at(end[:, :2], course, problem.motion.steady_speed_m_s < 0)
+    course = end[..., 2] + problem.motion.course[:-1]
+    middle = problem.to_goal.at(end[..., :2])
+    left = problem.to_goal_by_heading.at(end[..., :2], course, problem.motion.steady_speed_m_s < 0)
     return np.where(left < BLOCKED_S, left, middle + OFF_THE_WAY_S), middle
 
 
 def _by_place(problem: Problem, end: Array) -> tuple[Array, Array]:
     """Return the cost of what is left, and whether there is a way at all."""
-    course = end[:, 2] + problem.motion.course[:-1]
+    course = end[..., 2] + problem.motion.course[:-1]
     lever = problem.robot.length_m / 2
-    along = lever * np.stack([np.cos(course), np.sin(course)], axis=1)
-    where = end[:, :2]
+    along = lever * np.stack([np.cos(course), np.sin(course)], axis=-1)
+    where = end[..., :2]
     middle, head, front = problem.to_goal.at(np.stack([where, where + along, where + 0.5 * along]))
     head = np.where(head < BLOCKED_S, head, middle + OFF_THE_WAY_S)
     front = np.where(front < BLOCKED_S, front, middle + 0.5 * OFF_THE_WAY_S)
@@ -60,7 +62,12 @@ def _by_place(problem: Problem, end: Array) -> tuple[Array, Array]:
     return (middle + 2 * head + front) / 4, middle
 
 
-def motion_lines(problem: Problem, before: int, pose: Array, gaits: NDArray[np.int64] | slice) -> Array:
-    """Return thinned centre lines (gaits, samples, points, 2) of a cycle of some gaits after another."""
-    body = problem.motion.body[problem.motion.row(before), gaits, 2::2, ::4]
-    return points_in_room(body, pose[gaits, 2::2])
+def motion_lines(
+    problem: Problem, before: int | Sequence[int], pose: Array, gaits: NDArray[np.int64]
+) -> Array:
+    """Return thinned centre lines (n, samples, points, 2) of cycles of gaits (n,) after another or others.
+
+    `pose` (n, SAMPLES + 1, 3) is over these cycles.
+    """
+    rows = problem.motion.row(before) if isinstance(before, int) else np.array(problem.motion.rows(before))
+    return points_in_room(problem.motion.body[rows, gaits, 2::2, ::4], pose[:, 2::2])

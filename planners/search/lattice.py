@@ -136,7 +136,7 @@ class LatticeSearch:
         state, before = self._tree.cycle[node].state, self._tree.gait[node]
         move = motion.move(state[X], state[Y], state[HEADING], before, state[FORWARD])
         # every other point and sample decides what is out of the question; the simulation decides the rest
-        lines = motion_lines(problem, before, move.pose, self._gaits)
+        lines = motion_lines(problem, before, move.pose[self._gaits], self._gaits)
         room = problem.body.estimate(lines).min(axis=1)
         left = cost_to_go(problem, move.pose[:, -1], move.speed_m_s, s.by_heading)
         possible = (room > problem.margin_m - problem.field.error_m) & (left < BLOCKED_S / 2)

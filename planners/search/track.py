@@ -215,7 +215,7 @@ def _room(problem: Problem, lines: Array) -> Array:
     room = problem.body.estimate(flat)
     close = room < AIR * problem.robot.length_m + problem.field.error_m
     if close.any():
-        room[close] = problem.body.exact(flat[close])
+        room[close] = problem.body.exact(flat[close], room[close])
     return np.asarray(room.reshape(lines.shape[:2]).min(axis=1))
 
 
