@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -77,27 +78,30 @@ class Gait:
 
     def switch_times_s(self) -> np.ndarray:
         """Return the sorted distinct switch times in [0, period)."""
+        return np.array(self._switch_times())
+
+    def _switch_times(self) -> list[float]:
         times = sorted(t for intervals in self.intervals for pair in intervals for t in pair)
         kept: list[float] = []
         for t in times:
             if not kept or t - kept[-1] > _COINCIDENT_S:
                 kept.append(t)
-        return np.array(kept)
+        return kept
 
     def phases(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the cycle as phases of held valves: durations (n,) s and valve states (N-1, n).
 
         The first phase begins at time 0; durations add up to the period.
         """
-        inner = [t for t in self.switch_times_s() if _COINCIDENT_S < t < self.period_s - _COINCIDENT_S]
-        edges = np.array([0.0, *inner, self.period_s])
-        middles = (edges[:-1] + edges[1:]) / 2
-        valve = np.full((self.segments, middles.size), -1.0)
-        for row, intervals in zip(valve, self.intervals):
-            for on, off in intervals:
-                after, before = middles >= on, middles < off
-                row[after & before if on < off else after | before] = 1.0
-        return np.diff(edges), valve
+        inner = [t for t in self._switch_times() if _COINCIDENT_S < t < self.period_s - _COINCIDENT_S]
+        edges = [0.0, *inner, self.period_s]
+        middles = [(a + b) / 2 for a, b in pairwise(edges)]
+        # a handful of numbers: lists take a third of the time that arrays do
+        valve = [
+            [1.0 if any(_inside(t, on, off) for on, off in pairs) else -1.0 for t in middles]
+            for pairs in self.intervals
+        ]
+        return np.array([b - a for a, b in pairwise(edges)]), np.array(valve)
 
     def shortest_dwell_s(self) -> float:
         """Return the shortest time for which any valve stays on or off (infinite without switches)."""

@@ -77,6 +77,8 @@ class Bending:
 
         What the stiffness's deviation does counts up to `most_m` at the cycle's end.
         """
+        if self.deviation_m is None and not self.calibration.margin_m(1.0):
+            return np.zeros(len(pose))
         way = distance_along(pose[:, :2])
         measured = self.calibration.margin_m(1.0) * way
         if self.deviation_m is None:

@@ -12,6 +12,7 @@ from srs_opt.simulate.mesh import Mesh
 from srs_opt.simulate.timeline import Timeline
 
 Array = NDArray[np.float64]
+_BEGIN, _SHARES = np.zeros(1), np.arange(SAMPLES + 1) / SAMPLES
 
 
 class CycleRun:
@@ -37,10 +38,10 @@ class CycleRun:
             for piece in run.pieces(timeline)
         ]
         steps = np.concatenate([mesh.h_s for mesh, _, _ in self._pieces])
-        time = np.concatenate([[0.0], np.cumsum(steps)])
-        at = np.linspace(0.0, time[-1], SAMPLES + 1)
+        time = np.concatenate([_BEGIN, np.cumsum(steps)])
+        at = time[-1] * _SHARES
         # sample k lies between nodes low[k] and the next, at share[k] of the way
-        self._low = np.clip(np.searchsorted(time, at, side="right") - 1, 0, time.size - 2)
+        self._low = np.minimum(np.searchsorted(time, at, side="right") - 1, time.size - 2)
         self._share = ((at - time[self._low]) / steps[self._low])[:, None]
 
     def __call__(self, state: Array) -> Search[tuple[Array, Array]]:

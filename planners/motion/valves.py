@@ -308,11 +308,12 @@ def _ramped(cycle: Timeline, from_kpa: float, ramp_s: float, stair_s: float) -> 
     to_kpa = float(cycle.pressure_kpa[0])
     stairs = math.ceil(ramp_s / stair_s - 1e-9)
     ends = np.cumsum(cycle.duration_s)
-    edges = np.sort(np.concatenate([ramp_s / stairs * np.arange(stairs + 1), ends]))
-    edges = edges[np.append(True, np.diff(edges) > _SAME_S)]
+    edges = np.concatenate([ramp_s / stairs * np.arange(stairs + 1), ends])
+    edges.sort()
+    edges = np.concatenate([edges[:1], edges[1:][edges[1:] - edges[:-1] > _SAME_S]])
     edges[-1] = ends[-1]
     middles = (edges[:-1] + edges[1:]) / 2
-    phase = np.searchsorted(ends, middles).clip(max=ends.size - 1)
+    phase = np.minimum(np.searchsorted(ends, middles), ends.size - 1)
     # the mean over every phase: exact to first order, also where a valve switches within a stair
     pressure = np.interp(middles, [0.0, ramp_s], [from_kpa, to_kpa])
-    return Timeline(np.diff(edges), cycle.valve[:, phase], pressure, cycle.frequency_hz[phase])
+    return Timeline(edges[1:] - edges[:-1], cycle.valve[:, phase], pressure, cycle.frequency_hz[phase])

@@ -251,6 +251,12 @@ def _runs_of_alike(pieces: list[Timeline]) -> list[tuple[Timeline, bytes, int]]:
 
 def _pieces(timeline: Timeline, pressure_kpa: np.ndarray, longest_phases: int = 400) -> list[Timeline]:
     """Cut a timeline where pressure or frequency change, and at cycle ends, so that meshes can be reused."""
+    alike = (pressure_kpa == pressure_kpa[0]).all() and (
+        timeline.frequency_hz == timeline.frequency_hz[0]
+    ).all()
+    short = timeline.duration_s.size <= longest_phases
+    if alike and short and timeline.duration_s.sum() < 1 / timeline.frequency_hz[0] + 1e-9:
+        return [timeline]
     pieces = []
     setting = list(zip(pressure_kpa.tolist(), timeline.frequency_hz.tolist()))
     start, elapsed, n = 0, 0.0, len(setting)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -84,7 +84,7 @@ class Timeline:
         if (self.pressure_kpa == most).all():
             return self
         pressure = np.full(self.duration_s.size, most)
-        return replace(self, valve=self.valve * self.pressure_kpa / most, pressure_kpa=pressure)
+        return Timeline(self.duration_s, self.valve * self.pressure_kpa / most, pressure, self.frequency_hz)
 
     def until(self, end_s: float) -> Timeline:
         """Return the timeline cut off at `end_s`."""
