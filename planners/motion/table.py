@@ -223,7 +223,9 @@ def courses(steady: Array, still_m: float) -> Array:
     return np.where(np.hypot(dx, dy) > still_m, chord - turn / 2, 0.0)
 
 
-def _between(low: Array, high: Array, weight: NDArray[np.float32]) -> Array:
+def _between(
+    low: NDArray[np.float32], high: NDArray[np.float32], weight: NDArray[np.float32]
+) -> NDArray[np.float32]:
     """Interpolate between two levels of several entries (n, ...)."""
     weight = weight.reshape(-1, *[1] * (low.ndim - 1))
     return np.asarray((1 - weight) * low + weight * high)
