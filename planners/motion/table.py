@@ -118,7 +118,7 @@ class MotionTable:
         local, after = ((1 - weight) * t[:, low] + weight * t[:, low + 1] for t in tables)
         return Motion(compose(np.array([x, y, heading]), local), after)
 
-    def ends(self, start: Array, before: Sequence[int], speed_m_s: Sequence[float]) -> tuple[Array, Array]:
+    def ends(self, start: Array, before: Sequence[int], speed_m_s: Sequence[float]) -> Motion:
         """Return where a cycle of each gait ends from several states.
 
         Parameters
@@ -129,16 +129,15 @@ class MotionTable:
 
         Returns
         -------
-        pose : array (n, gaits, 3)
-        speed_m_s : array (n, gaits)
-            Forward.
+        Motion
+            Pose (n, gaits, 3) and speed (n, gaits) at the ends.
         """
         rows, low, weight = self._levels(before, speed_m_s)
         local, after = (
             _between(t[rows, :, low], t[rows, :, low + 1], weight)
             for t in (self.pose[..., -1, :], self.speed_after_m_s)
         )
-        return compose(start[:, None], local), after
+        return Motion(compose(start[:, None], local), after.astype(np.float64))
 
     def poses(
         self, start: Array, before: Sequence[int], speed_m_s: Sequence[float], now: NDArray[np.int64]
