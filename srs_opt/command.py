@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from srs_opt.robot import Robot
 
 T = TypeVar("T")
+MODELS = ("complex", "simplified", "compliant")  # those of the library; model.registry has them all
 FAULT = 70  # exit status of a bug (EX_SOFTWARE); 0, 1 and 2 are answers
 
 
@@ -105,8 +106,9 @@ def add_model(parser: argparse.ArgumentParser) -> None:
     """Add the choice of the dynamic model."""
     parser.add_argument(
         "--model",
-        choices=("complex", "simplified", "compliant"),
-        help="dynamic model (default: compliant where the robot file has a stiffness, else complex)",
+        metavar="NAME",
+        help=f"dynamic model: {', '.join(MODELS)}, or one that a --plugin defines (default: compliant where "
+        "the robot file has a stiffness, else complex)",
     )
 
 
@@ -121,6 +123,17 @@ def add_valve_limits(parser: argparse._ActionsContainer) -> None:
     add(
         "--tick", type=positive_float, default=0.001, metavar="S", help="controller's tick, s (default 0.001)"
     )
+
+
+def _check_model(name: str | None) -> None:
+    """Refuse a model that is not known, before anything slow."""
+    if name is not None and name not in MODELS:
+        from srs_opt.document import unknown_word
+        from srs_opt.errors import InputError
+        from srs_opt.registry import own_names
+
+        if name not in (own := own_names("model")):
+            raise InputError(f"--model: {unknown_word('model', name, [*MODELS, *own])}")
 
 
 def chosen_model(options: argparse.Namespace, robot: Robot) -> str:
@@ -148,6 +161,7 @@ def run_command(
 
             for file in options.plugin:
                 load_plugin(file)
+        _check_model(getattr(options, "model", None))
         answer = run(options)
         if options.json:
             print(json.dumps(answer.record, allow_nan=False))

@@ -1,8 +1,8 @@
 """Plugins: files that the command line names with --plugin, and entry points of installed packages.
 
-A plugin registers what it defines when it is run (`srs_opt.effects.register_effect`,
-`srs_opt.gait_opt.objectives.registry.register_objective`, `planners.plan.registry.register_planner`). A
-robot file may say which plugins it needs; loading it never runs one.
+A plugin registers what it defines when it is run (`srs_opt.effects.register_effect`, `register_planner`,
+and whatever has a `srs_opt.registry.Registry`: models, objectives, instruments, judges). A robot file may
+say which plugins it needs; loading it never runs one.
 """
 
 from __future__ import annotations

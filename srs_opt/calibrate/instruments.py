@@ -15,6 +15,7 @@ from srs_opt.calibrate.model import Conditions, Model, Values
 from srs_opt.calibrate.normal_equations import NormalEquations
 from srs_opt.effects import known_effects
 from srs_opt.effects.effect import LinkState
+from srs_opt.measurement.instruments import INSTRUMENTS, Instrument, Scene
 from srs_opt.measurement.records import Bench, Check, TowTest
 from srs_opt.model.compliant import CompliantModel
 from srs_opt.model.mechanics import Mechanics
@@ -37,41 +38,26 @@ class Reading:
 def check_expectations(model: Model) -> Mapping[str, Callable[[Values], float]]:
     """Return what each known check should read, by its quantity: asked of the effects' own hooks."""
     still = Conditions(0.0, 1.0)
-    function = _instrument_readings(model.full, model.camera)
+    known = tuple(INSTRUMENTS.all().values())
+    function = _instrument_readings(model.full, model.camera, known)
 
-    def reads(quantity: str) -> Callable[[Values], float]:
-        k = QUANTITIES.index(quantity)
-
+    def reads(k: int) -> Callable[[Values], float]:
         def expected(values: Values) -> float:
             packed = model.pack(values, still)
             return float(function(packed.p, packed.camera, packed.clock_s)[k])
 
         return expected
 
-    return {quantity: reads(quantity) for quantity in QUANTITIES}
-
-
-QUANTITIES = (
-    "tail_load_n",
-    "head_load_n",
-    "ruler_scale",
-    "ruler_scale_at_1m",
-    "valve_light_delay_s",
-    "floor_angle_rad",
-    "bending_flexibility_1_n_m2",
-)
+    return {instrument.name: reads(k) for k, instrument in enumerate(known)}
 
 
 @lru_cache(maxsize=8)
-def _instrument_readings(structure: Structure, seen: tuple[str, ...]) -> ca.Function:
-    """Return ``(p, camera, clock_s) -> (QUANTITIES)`` for the straight robot at rest.
-
-    Scales under the tail's and the head's wheels; a short ruler across at x = 0 and 1 m, measured over true
-    length; when a light that follows the valve's command is seen; how steep the floor is; 1/EI of a segment.
-    """
+def _instrument_readings(
+    structure: Structure, seen: tuple[str, ...], instruments: tuple[Instrument, ...]
+) -> ca.Function:
+    """Return ``(p, camera, clock_s) -> (readings)`` for the straight robot at rest."""
     parameters, m, _ = build(structure)
     clock = ca.SX.sym("clock")
-    weight = m.normal_force()
     effects = [known_effects()[name] for name in seen]
     own = {e.name: effect_symbols(e, structure.links) for e in effects}
     camera = ca.vertcat(*(v for symbols in own.values() for v in symbols.values()))
@@ -89,9 +75,16 @@ def _instrument_readings(structure: Structure, seen: tuple[str, ...]) -> ca.Func
             slope = slope + ca.vertcat(fx[0], fy[0]) / (m.mass[0] * parameters["gravity_m_s2"])
     steep = ca.sqrt(ca.sumsqr(slope) + 1e-24)
     assert isinstance(m, CompliantModel)
-    optics = [across(0, 0, camera), across(1, 0, camera)]
-    readings = [weight[0], weight[-1], *optics, -clock, ca.asin(steep), 1 / m.stiffness()]
-    straight = [ca.substitute(ca.SX(r), m.shape, ca.SX.zeros(m.shape.shape)) for r in readings]
+    scene = Scene(
+        load_n=m.normal_force(),
+        magnification=lambda at_m: across(at_m, 0, camera),
+        clock_s=clock,
+        floor_rad=ca.asin(steep),
+        flexibility_1_n_m2=1 / m.stiffness(),
+        parameter=lambda name: parameters[name],
+    )
+    shown = [ca.SX(instrument.reads(scene)) for instrument in instruments]
+    straight = [ca.substitute(r, m.shape, ca.SX.zeros(m.shape.shape)) for r in shown]
     return ca.Function("readings", [parameters.vector, camera, clock], [ca.vertcat(*straight)])
 
 

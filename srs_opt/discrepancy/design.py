@@ -13,6 +13,7 @@ from srs_opt.calibrate.normal_equations import bounded_solve
 from srs_opt.discrepancy.hypothesis import Hypothesis
 from srs_opt.discrepancy.select import Selection
 from srs_opt.errors import NoAnswerError
+from srs_opt.measurement.instruments import INSTRUMENTS
 from srs_opt.measurement.records import Schedule, Trial
 
 LEVEL = 10.0  # deviance that tells two hypotheses apart
@@ -40,22 +41,6 @@ class NextExperiment:
     what: str
     separates: tuple[str, ...]
     expected_power: float
-
-
-# what a further instrument shows (a quantity of bench/checks.csv) and its standard deviation
-INSTRUMENTS = {
-    "valve_light_delay_s": ("a light on the valve's command", 0.002),
-    "ruler_scale": ("a ruler in the picture", 0.002),
-    "ruler_scale_at_1m": ("a ruler in the picture at x = 1 m", 0.002),
-    "tail_load_n": ("a scale under the tail's wheels", 0.005),
-    "head_load_n": ("a scale under the head's wheels", 0.005),
-    "floor_angle_rad": ("a level on the floor", 0.001),
-    # four pairs of steps know 1/EI to 3 to 5 % at 0.002 to 0.02 N m^2
-    "bending_flexibility_1_n_m2": (
-        "steps of single segments, lifted and on the ground, bench/steps.csv",
-        8.0,
-    ),
-}
 
 
 def rivals_of(selection: Selection, fitted: Sequence[Hypothesis], null: Hypothesis) -> tuple[Hypothesis, ...]:
@@ -89,12 +74,12 @@ def next_experiment(
     if len(rivals) < 2 or not trials:
         return None
     first, second = rivals[0], rivals[1]
-    expected = check_expectations(experiment.model)
+    expected, tools = check_expectations(experiment.model), INSTRUMENTS.all()
     options = {
-        f"{what} ({quantity})": _instrument_gain(expected[quantity], sd, first, second)
-        for quantity, (what, sd) in INSTRUMENTS.items()
+        f"{tool.what} ({name})": _instrument_gain(expected[name], tool.sd, first, second)
+        for name, tool in tools.items()
     }
-    direct = [f"{INSTRUMENTS[q][0]} ({q})" for q in _own_instruments(first, second)]
+    direct = [f"{tools[q].what} ({q})" for q in _own_instruments(first, second)]
     sure = {what: options[what] for what in direct if power(options[what]) > SURE}
     if not sure:  # trials cost a simulation each
         new = proposals(experiment, trials)
@@ -119,7 +104,7 @@ def _own_instruments(a: Hypothesis, b: Hypothesis) -> list[str]:
     from srs_opt.effects import known_effects
 
     asked = (known_effects()[name].instrument for name in {*a.names} ^ {*b.names})
-    return sorted({q for q in asked if q in INSTRUMENTS})
+    return sorted({q for q in asked if q is not None and q in INSTRUMENTS.all()})
 
 
 def power(gain: float) -> float:

@@ -45,6 +45,10 @@ def build_parser() -> Parser:
         "manoeuvre.json (with valves.csv beside it)",
     )
     add("--pressure", type=positive_float, default=55.0, metavar="KPA", help="for a schedule (default 55)")
+    add(
+        "--engine", default="dart", metavar="NAME",
+        help="what judges gaits: dart, or one that a --plugin defines (default dart)",
+    )  # fmt: skip
     add("--step", type=positive_float, default=1e-3, metavar="S", help="the engine's step (default 0.001)")
     add(
         "--refine",
@@ -67,17 +71,22 @@ def build_parser() -> Parser:
 
 def run(options: argparse.Namespace) -> Answer:
     """Read, play, compare."""
-    from srs_opt.judge.bodies import check_engine, check_robot
+    from srs_opt.errors import InputError
     from srs_opt.judge.opinion import Tolerance
+    from srs_opt.judge.registry import DART, JUDGES
     from srs_opt.robot import load_robot
 
-    check_engine()
+    judge = JUDGES.named(options.engine)
+    judge.check_engine()
     robot = load_robot(options.robot)
-    check_robot(robot)
+    judge.check_robot(robot)
+    name = Path(options.file).name
+    if judge is not DART and name in ("plan.json", "motion.json", "manoeuvre.json"):
+        raise InputError(f"--engine {judge.name}: a plan or a manoeuvre is played by {DART.name} only")
     tolerance = Tolerance(options.tolerance, 1.5 * options.tolerance)
-    if Path(options.file).name in ("plan.json", "motion.json"):
+    if name in ("plan.json", "motion.json"):
         return _motion(options, robot)
-    if Path(options.file).name == "manoeuvre.json":
+    if name == "manoeuvre.json":
         return _manoeuvre(options, robot)
     return _gaits(options, robot, tolerance)
 
@@ -137,12 +146,14 @@ def _gaits(options: argparse.Namespace, robot: Robot, tolerance: Tolerance) -> A
     begun = time.perf_counter()
     found = opinions(
         robot, cases, model, settings, tolerance, jobs=options.jobs, cluster=options.cluster,
-        quiet=options.quiet, resume=Resume(unfinished, f"judge {robot.fingerprint()} {model} {settings}"),
+        quiet=options.quiet, engine=options.engine,
+        resume=Resume(unfinished, f"{options.engine} {robot.fingerprint()} {model} {settings}"),
     )  # fmt: skip
     shutil.rmtree(unfinished, ignore_errors=True)
     answer = {
         "gaits": [opinion.to_record() for opinion in found],
         "agree": sum(opinion.agrees for opinion in found),
+        "engine": options.engine,
         "tolerance": tolerance.to_record(),
         "robot": robot.name,
         "model": model,

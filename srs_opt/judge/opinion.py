@@ -9,7 +9,8 @@ from typing import Any
 
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait, check_gait
-from srs_opt.judge.gaits import DEFAULT_SETTINGS, Judged, Settings, judge_gait
+from srs_opt.judge.gaits import DEFAULT_SETTINGS, Judged, Settings
+from srs_opt.judge.registry import DART, JUDGES
 from srs_opt.orbit.steady import steady_gait
 from srs_opt.parallel import executor
 from srs_opt.parallel.sweep import Resume, sweep
@@ -110,8 +111,9 @@ def opinion_on(
     tolerance: Tolerance = DEFAULT_TOLERANCE,
     *,
     refine: bool = True,
+    engine: str = DART.name,
 ) -> Opinion:
-    """Return both motions of one gait.
+    """Return both motions of one gait; `engine` names the judge.
 
     Raises
     ------
@@ -119,7 +121,7 @@ def opinion_on(
         If gait and robot do not belong together, or the engine cannot stand for the robot.
     """
     check_gait(robot, gait)
-    judged = judge_gait(robot, gait, settings, refine=refine)
+    judged = JUDGES.named(engine).judge_gait(robot, gait, settings, refine)
     return Opinion(name, ours_of(robot, gait, model), judged, tolerance)
 
 
@@ -143,9 +145,10 @@ def opinions(
     cluster: str | None = None,
     quiet: bool = True,
     resume: Resume | None = None,
+    engine: str = DART.name,
 ) -> list[Opinion]:
     """Return the opinions on many gaits, in order."""
-    work = partial(_chunk, robot, model, settings)
+    work = partial(_chunk, robot, model, settings, engine)
     with executor(jobs, cluster) as where:
         rows = list(
             sweep(work, list(cases), chunk=1, where=where, what="judging", quiet=quiet, resume=resume)
@@ -156,10 +159,12 @@ def opinions(
     ]
 
 
-def _chunk(robot: Robot, model: str | None, settings: Settings, cases: Sequence[Case]) -> list[Any]:
+def _chunk(
+    robot: Robot, model: str | None, settings: Settings, engine: str, cases: Sequence[Case]
+) -> list[Any]:
     """Return the opinions on some gaits as JSON holds them."""
     found = []
     for case in cases:
-        opinion = opinion_on(robot, case.name, case.gait, model, settings, refine=case.refine)
+        opinion = opinion_on(robot, case.name, case.gait, model, settings, refine=case.refine, engine=engine)
         found.append([list(vars(opinion.ours).values()), dict(vars(opinion.judge))])
     return found

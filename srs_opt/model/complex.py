@@ -14,6 +14,8 @@ from srs_opt.model.mechanics import Forces, Mechanics
 class ComplexModel(Mechanics):
     """Exact rigid-link mechanics with the curvature given by the actuators."""
 
+    name = "complex"
+
     def yaw_inertia(self) -> ca.SX:
         """Return sum m |rho_i|^2 + sum J."""
         c = self.chain

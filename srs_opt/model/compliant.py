@@ -25,6 +25,8 @@ class CompliantModel(ComplexModel):
         Second time derivative of the curvatures without load (chambers that lengthen feel it).
     """
 
+    name = "compliant"
+
     def __init__(self, parameters: Parameters) -> None:
         super().__init__(parameters)
         self.no_load_acceleration = ca.SX.sym("no_load_acceleration", self.links - 1)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from typing import ClassVar
 
 import casadi as ca
 
@@ -54,6 +55,8 @@ class Mechanics(ABC):
     shape, shape_rate : SX
         The symbols that the places of all points of the body depend on (`StateLayout.shape`), their rates.
     """
+
+    name: ClassVar[str]  # as --model has it
 
     def __init__(self, parameters: Parameters) -> None:
         p = self.parameters = parameters

@@ -1,11 +1,9 @@
-"""The models by name; a third model is one new file and one line here."""
+"""The dynamic models by name: the library's, and those that plugins and installed packages register."""
 
 from __future__ import annotations
 
 from functools import lru_cache
 
-from srs_opt.document import unknown_word
-from srs_opt.errors import InputError
 from srs_opt.model.actuator import Actuator
 from srs_opt.model.complex import ComplexModel
 from srs_opt.model.compliant import CompliantModel
@@ -13,12 +11,27 @@ from srs_opt.model.mechanics import Mechanics
 from srs_opt.model.parameters import Parameters, Structure
 from srs_opt.model.simplified import SimplifiedModel
 from srs_opt.model.state import StateLayout
+from srs_opt.registry import Registry
 
-MODELS: dict[str, type[Mechanics]] = {
-    "complex": ComplexModel,
-    "simplified": SimplifiedModel,
-    "compliant": CompliantModel,
-}
+MODELS: Registry[type[Mechanics]] = Registry(
+    "model",
+    lambda: {model.name: model for model in (ComplexModel, SimplifiedModel, CompliantModel)},
+    lambda thing: isinstance(thing, type) and issubclass(thing, Mechanics) and thing is not Mechanics,
+)
+
+
+def register_model(model: type[Mechanics]) -> type[Mechanics]:
+    """Make a dynamic model of your own known: ``--model NAME`` then takes it.
+
+    It is a subclass of `Mechanics` with a `name` and the three methods of the yaw equation; its curvature is
+    that of the actuators.
+
+    Raises
+    ------
+    InputError
+        If the name is taken or no plain word.
+    """
+    return MODELS.register(model)
 
 
 @lru_cache(maxsize=64)
@@ -30,10 +43,9 @@ def build(structure: Structure) -> tuple[Parameters, Mechanics, Actuator]:
     InputError
         For an unknown model name.
     """
-    if structure.model not in MODELS:
-        raise InputError(unknown_word("model", structure.model, sorted(MODELS)))
+    model = MODELS.named(structure.model)
     parameters = Parameters(structure)
-    return parameters, MODELS[structure.model](parameters), Actuator(parameters)
+    return parameters, model(parameters), Actuator(parameters)
 
 
 def state_layout(structure: Structure) -> StateLayout:

@@ -16,6 +16,8 @@ from srs_opt.model.mechanics import Forces, Mechanics
 class SimplifiedModel(Mechanics):
     """Translation exact, yaw from neighbours' friction moments only."""
 
+    name = "simplified"
+
     def _link_inertia(self) -> ca.SX:
         """Return j(i) of (4), (N, 1): a third of m l^2 for every arc that ends at the link."""
         arms2 = chord_length(self.kappa, self.length) ** 2

@@ -30,6 +30,7 @@ from srs_opt.effects.plugins import registered
 from srs_opt.errors import InputError
 from srs_opt.files import temporary_folder
 from srs_opt.interrupts import signals_deferred
+from srs_opt.registry import own_names
 from srs_opt.simulate.parts import in_parts
 
 FLAGS = ("-O1", "-fPIC", "-shared", "-fno-math-errno")
@@ -127,7 +128,9 @@ def shared_library(
     if cc is None:
         return None
     parts = [key, _source_digest(), ca.CasadiMeta.version(), platform.machine(), *cc[0], cc[1], *flags]
-    if any(name in key for name in registered()):  # their equations are not part of the package's sources
+    if any(
+        name in key for name in (*registered(), *own_names("model"))
+    ):  # their equations are not part of the package's sources
         parts.append(build().serialize())
     path = cache_folder() / f"srs_{hashlib.sha256(chr(0).join(parts).encode()).hexdigest()[:32]}.so"
     _check_owner(path.parent)

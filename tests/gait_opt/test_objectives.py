@@ -19,7 +19,7 @@ from srs_opt.gait_opt.continuation import Stage, orbits_of, solve_from
 from srs_opt.gait_opt.corrections import on_ticks
 from srs_opt.gait_opt.goal import Goal, Limits
 from srs_opt.gait_opt.objectives.objective import Objective
-from srs_opt.gait_opt.objectives.registry import built_in, objective_named, register_objective
+from srs_opt.gait_opt.objectives.registry import OBJECTIVES, objective_named, register_objective
 from srs_opt.gait_opt.optimize import optimize_gait
 from srs_opt.gait_opt.prices import prices
 from srs_opt.gait_opt.score import evaluated, score
@@ -47,7 +47,7 @@ def at_least_slow(cycle):
 OWN = Objective("bend", bend, constraints=(at_least_slow, lambda cycle: 0.3 - cycle.band_m), turn="any")
 
 
-@pytest.mark.parametrize("objective", [*built_in().values(), OWN], ids=lambda o: o.name)
+@pytest.mark.parametrize("objective", [*OBJECTIVES.built_in.values(), OWN], ids=lambda o: o.name)
 def test_program_and_simulation_see_the_same_merit(objective):
     case = problem(Goal(objective, speed_m_s=0.01 if objective.needs_speed else None))
     smooth = replace(ROBOT, friction_speed_m_s=0.1)
@@ -101,7 +101,8 @@ def test_objectives_travel_and_are_known_by_name():
     again = pickle.loads(pickle.dumps(OWN))
     assert again == OWN
     assert again.merit is not None
-    assert pickle.loads(pickle.dumps(built_in()["slim"])) == built_in()["slim"]
+    slim = OBJECTIVES.built_in["slim"]
+    assert pickle.loads(pickle.dumps(slim)) == slim
     known = register_objective(Objective("least_bend", bend))
     assert objective_named("least_bend") is known
     with pytest.raises(InputError, match="registered before"):

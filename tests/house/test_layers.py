@@ -13,7 +13,7 @@ ROOT = Path(__file__).resolve().parents[2]
 LAYERS = (
     ("srs_opt.errors", "srs_opt.geometry", "srs_opt.interrupts", "srs_opt.callable_package"),
     ("srs_opt.files", "srs_opt.plugins"),
-    ("srs_opt.document", "srs_opt.figures", "srs_opt.parallel"),
+    ("srs_opt.document", "srs_opt.figures", "srs_opt.parallel", "srs_opt.registry"),
     ("srs_opt.command", "srs_opt.problem", "srs_opt.result"),
     ("srs_opt.table",),
     ("srs_opt.effects", "srs_opt.robots"),

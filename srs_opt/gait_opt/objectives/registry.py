@@ -2,39 +2,19 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable, Mapping
-from functools import lru_cache
-from types import MappingProxyType, ModuleType
+from collections.abc import Mapping
 
-from srs_opt import plugins
-from srs_opt.errors import InputError
 from srs_opt.gait_opt.objectives.objective import Objective
-
-GROUP = "srs_opt.objectives"
-_own: dict[str, Objective] = {}
-_asked_packages: list[str] = []
+from srs_opt.registry import Registry
 
 
-@lru_cache(maxsize=1)
-def built_in() -> Mapping[str, Objective]:
-    """Return the library's objectives by name."""
-    from srs_opt.gait_opt.objectives import built_in as library
+def _library() -> Mapping[str, Objective]:
+    from srs_opt.gait_opt.objectives import built_in
 
-    found = [value for value in vars(library).values() if isinstance(value, Objective)]
-    return MappingProxyType({objective.name: objective for objective in found})
+    return {value.name: value for value in vars(built_in).values() if isinstance(value, Objective)}
 
 
-def all_objectives() -> Mapping[str, Objective]:
-    """Return every known objective by name, own ones last."""
-    if not _asked_packages:
-        _asked_packages.append(GROUP)
-        for _, offered in plugins.entry_points(GROUP):
-            found = vars(offered).values() if isinstance(offered, ModuleType) else offered
-            for objective in found if isinstance(found, Iterable) else (found,):
-                if isinstance(objective, Objective):
-                    register_objective(objective)
-    return MappingProxyType({**built_in(), **_own})
+OBJECTIVES: Registry[Objective] = Registry("objective", _library, lambda thing: isinstance(thing, Objective))
 
 
 def register_objective(objective: Objective) -> Objective:
@@ -48,14 +28,7 @@ def register_objective(objective: Objective) -> Objective:
     InputError
         If the name is taken or no plain word.
     """
-    name = objective.name
-    if not re.fullmatch(r"[a-z][a-z0-9_]*", name):
-        raise InputError(f"objective '{name}': expected a name of lower-case letters, digits and underscores")
-    if name in built_in():
-        raise InputError(f"objective '{name}' exists already; choose another name")
-    if _own.setdefault(name, objective) != objective:
-        raise InputError(f"objective '{name}' was registered before with another definition")
-    return objective
+    return OBJECTIVES.register(objective)
 
 
 def objective_named(name: str) -> Objective:
@@ -66,9 +39,4 @@ def objective_named(name: str) -> Objective:
     InputError
         If there is none.
     """
-    known = all_objectives()
-    if name not in known:
-        raise InputError(
-            f"objective must be one of {', '.join(known)}, found '{name}' (--plugin FILE.py adds your own)"
-        )
-    return known[name]
+    return OBJECTIVES.named(name)
