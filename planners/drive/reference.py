@@ -9,6 +9,7 @@ import numpy as np
 from planners.plan.answer import Plan
 from planners.search.problem import Problem
 from planners.search.track import NODES_PER_CYCLE, Reference
+from srs_opt.simulate.interpolate import linear
 
 # In body lengths, and body lengths per second.
 BEYOND = 0.508  # past the goal
@@ -31,7 +32,7 @@ def reference_of(problem: Problem, plan: Plan) -> Reference:
     course[-1] = course[-2] if c.time_s[-1] < ends[-1] - 1e-6 else course[-1]
     count = max(2, NODES_PER_CYCLE * len(plan.gaits))
     times = np.linspace(0.0, c.time_s[-1], count)
-    x, y = (np.interp(times, c.time_s, c.pose[:, k]) for k in range(2))
+    x, y = linear(c.time_s, c.pose[:, :2], times).T
     speed = np.append(np.hypot(np.diff(x), np.diff(y)) / np.diff(times), np.nan)
     speed[-1] = speed[-2]
     backwards = np.array([steady[g] < 0 for g in way])

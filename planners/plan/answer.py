@@ -12,6 +12,7 @@ import numpy as np
 from planners.plan.certify import Certificate
 from planners.search.cost_model import gait_air_j
 from planners.search.problem import Problem
+from srs_opt.simulate.interpolate import linear
 
 Status = Literal["solved", "infeasible", "not_found", "timeout"]
 PATH_STEP_S = 0.05  # of the path in the record
@@ -77,9 +78,9 @@ class Plan:
         """Return the way as a list of times and poses."""
         c = self.certificate
         times = np.append(np.arange(0.0, self.duration_s, PATH_STEP_S), self.duration_s)
-        columns = [np.interp(times, c.time_s, c.pose[:, k]) for k in range(3)]
+        rows = np.column_stack([times, linear(c.time_s, c.pose, times)])
         keys = ("t_s", "x_m", "y_m", "heading_rad")
-        return [dict(zip(keys, map(float, row))) for row in np.round(np.stack([times, *columns], axis=1), 6)]
+        return [dict(zip(keys, map(float, row))) for row in np.round(rows, 6)]
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,7 @@ from srs_opt.geometry import points_in_room
 from srs_opt.model.outline import POINTS_PER_ARC
 from srs_opt.simulate.batched import Search, run_batched
 from srs_opt.simulate.integrate import Trajectory
+from srs_opt.simulate.interpolate import linear
 from srs_opt.simulate.shapes import centre_lines
 
 Array = NDArray[np.float64]
@@ -220,10 +221,7 @@ class Certifier:
         # the finer nodes lie a millisecond apart: what a line between two of them misses is a micrometre
         time, *fine_columns, _ = _joined(fine)
         at, pose, kappa, _ = _joined([_thinned(t, COMPARED) for t in coarse])
-        fine_pose, fine_kappa = (
-            np.stack([np.interp(at, time, column) for column in columns.T], axis=1)
-            for columns in fine_columns
-        )
+        fine_pose, fine_kappa = (linear(time, columns, at) for columns in fine_columns)
         here = points_in_room(centre_lines(run, fine_kappa), fine_pose)
         there = points_in_room(centre_lines(run, kappa), pose)
         apart = np.hypot(*(here - there).transpose(2, 0, 1)).max(axis=1)

@@ -13,14 +13,14 @@ from planners.maze.places import Goal
 from planners.refine.shots import WindowShot
 from planners.search.problem import Problem
 from srs_opt.manoeuvre.rows import BEND_M2, LEVER_M, body_points
-from srs_opt.model.state import FORWARD, HEADING
+from srs_opt.model.state import FORWARD, HEADING, PLACE, X, Y
 
 Array = NDArray[np.float64]
 LOOK_S = 0.005  # between instants at which the body is measured; it moves 3 mm meanwhile
 # Body lengths. Walls farther from the body than NEAR beyond the margin do not count: a step moves it by less.
 NEAR = 0.06
 SPARE = 1.2e-3  # beyond margin and goal: for ticks, chords between the body's points, and integration
-PLACE, SPEED = 0.002, 0.1  # tolerances of a window's end: body lengths, body lengths per second
+PLACE_OFF, SPEED_OFF = 0.002, 0.1  # tolerances of a window's end: body lengths, body lengths per second
 HEADING_RAD = 0.002
 BEND = 0.15  # and of its bends: a share of the largest one, or the heading would tell little of the course
 _HAIR_M = 1e-6
@@ -34,10 +34,10 @@ class End:
 
 
 class Values(NamedTuple):
-    """Limits in lengths: values (n,), to be at least 0, and slopes (n, unknowns), empty where not asked."""
+    """Limits in lengths: values (n,), to be at least 0, and Jacobian (n, unknowns), empty where not asked."""
 
     values: Array
-    slopes: Array
+    jacobian: Array
 
 
 class Limits:
@@ -71,27 +71,27 @@ class Limits:
         for shot, room in zip(shots, rooms):
             parts = [*self._ends(shot), room]
             values = np.concatenate([p.values for p in parts])
-            found.append(Values(values, np.concatenate([p.slopes for p in parts])))
+            found.append(Values(values, np.concatenate([p.jacobian for p in parts])))
         return found
 
     def _ends(self, shot: WindowShot) -> list[Values]:
         state, wanted = shot.states[-1], self.end.state
-        slopes = None if shot.slopes is None else shot.slopes[-1]
+        jacobian = None if shot.sensitivity is None else shot.sensitivity[-1]
         length = self.problem.robot.length_m
         if wanted is None:
-            return self._arrived(state, slopes)
-        bands = [(0, PLACE * length, 1.0), (1, PLACE * length, 1.0), (2, HEADING_RAD, LEVER_M)]
+            return self._arrived(state, jacobian)
+        bands = [(X, PLACE_OFF * length, 1.0), (Y, PLACE_OFF * length, 1.0), (HEADING, HEADING_RAD, LEVER_M)]
         found = []
         for index, tolerance, unit in bands:
             for sign in (1.0, -1.0):
                 value = unit * (tolerance - sign * (state[index] - wanted[index]))
-                found.append(_row(value, None if slopes is None else -sign * unit * slopes[index]))
-        forward = 1.0 if wanted[3] >= 0 else -1.0
-        value = LEVER_M * (forward * (state[FORWARD] - wanted[3]) + SPEED * length)
-        found.append(_row(value, None if slopes is None else LEVER_M * forward * slopes[3]))
-        return found + self._bends(shot, slopes)
+                found.append(_row(value, None if jacobian is None else -sign * unit * jacobian[index]))
+        forward = 1.0 if wanted[FORWARD] >= 0 else -1.0
+        value = LEVER_M * (forward * (state[FORWARD] - wanted[FORWARD]) + SPEED_OFF * length)
+        found.append(_row(value, None if jacobian is None else LEVER_M * forward * jacobian[FORWARD]))
+        return found + self._bends(shot, jacobian)
 
-    def _bends(self, shot: WindowShot, slopes: Array | None) -> list[Values]:
+    def _bends(self, shot: WindowShot, jacobian: Array | None) -> list[Values]:
         where = self.problem.integrator.layout.kappa
         assert self.end.state is not None
         wanted, largest = self.end.state[where], float(np.abs(shot.states[:, where]).max())
@@ -100,18 +100,18 @@ class Limits:
             off = shot.states[-1, index] - wanted[k]
             for sign in (1.0, -1.0):
                 value = BEND_M2 * (BEND * largest - sign * off)
-                found.append(_row(value, None if slopes is None else -sign * BEND_M2 * slopes[index]))
+                found.append(_row(value, None if jacobian is None else -sign * BEND_M2 * jacobian[index]))
         return found
 
-    def _arrived(self, state: Array, slopes: Array | None) -> list[Values]:
+    def _arrived(self, state: Array, jacobian: Array | None) -> list[Values]:
         goal = self.problem.goal
-        inside, toward = depth(goal, state[:2])
-        found = [_row(inside - self.spare_m / 4, None if slopes is None else toward @ slopes[:2])]
+        inside, toward = depth(goal, state[PLACE])
+        found = [_row(inside - self.spare_m / 4, None if jacobian is None else toward @ jacobian[PLACE])]
         if goal.heading is not None:
             off = (state[HEADING] - goal.heading + np.pi) % (2 * np.pi) - np.pi
             for sign in (1.0, -1.0):
                 value = LEVER_M * (0.99 * goal.heading_tolerance - sign * off)
-                found.append(_row(value, None if slopes is None else -sign * LEVER_M * slopes[2]))
+                found.append(_row(value, None if jacobian is None else -sign * LEVER_M * jacobian[HEADING]))
         return found
 
     def _rooms(self, shots: list[WindowShot]) -> list[Values]:
@@ -134,23 +134,23 @@ class Limits:
         found = []
         for shot, at, which, where, clear, margin in zip(shots, looked, chosen, points, room, wanted):
             values = clear - margin[which[0]]
-            slopes = np.zeros((values.size, 0))
-            if shot.slopes is not None:
-                slopes = self._room_slopes(shot, at, which, where, clear)
-            found.append(Values(values, slopes))
+            jacobian = np.zeros((values.size, 0))
+            if shot.sensitivity is not None:
+                jacobian = self._room_jacobian(shot, at, which, where, clear)
+            found.append(Values(values, jacobian))
         return found
 
-    def _room_slopes(
+    def _room_jacobian(
         self, shot: WindowShot, at: NDArray[np.int64], which: tuple[Array, ...], where: Array, clear: Array
     ) -> Array:
-        assert shot.slopes is not None
+        assert shot.sensitivity is not None
         if not len(where):
             return np.zeros((0, shot.window.size))
         aside = [self._clear(where + hair) for hair in _HAIR_M * np.eye(2)]
         toward = (np.stack(aside, axis=1) - clear[:, None]) / _HAIR_M
         bodies, index = np.unique(which[0], return_inverse=True)
         nodes = at[bodies]
-        _, lines = body_points(self.problem.integrator, shot.states[nodes], shot.slopes[nodes])
+        _, lines = body_points(self.problem.integrator, shot.states[nodes], shot.sensitivity[nodes])
         assert lines is not None
         return np.asarray(np.einsum("nk,nkm->nm", toward, lines[index, which[1]]))
 
@@ -181,8 +181,8 @@ def depth(goal: Goal, point: Array) -> tuple[float, Array]:
     return value, np.array([inside(point + hair) - value for hair in _HAIR_M * np.eye(2)]) / _HAIR_M
 
 
-def _row(value: float, slopes: Array | None) -> Values:
-    return Values(np.array([value]), np.zeros((1, 0)) if slopes is None else slopes[None, :])
+def _row(value: float, jacobian: Array | None) -> Values:
+    return Values(np.array([value]), np.zeros((1, 0)) if jacobian is None else jacobian[None, :])
 
 
 def _looks(shot: WindowShot) -> NDArray[np.int64]:

@@ -19,7 +19,7 @@ from planners.motion.valves import Joint, gait_end
 from planners.plan.answer import Plan
 from planners.plan.certify import CERTIFIED_STAIR_S, TOLERANCE, certify
 from planners.refine.limits import End, Limits, Values
-from planners.refine.shots import with_slopes
+from planners.refine.shots import with_sensitivity
 from planners.refine.solve import Before, Found, WindowSolver
 from planners.refine.ticks import on_ticks
 from planners.refine.window import Window
@@ -233,9 +233,9 @@ class _Refiner:
         return steps
 
     def _rounded(self, solver: WindowSolver, found: Found, cycles: int) -> Window:
-        shot = with_slopes(solver.run, solver.start, found.shot)
+        shot = with_sensitivity(solver.run, solver.start, found.shot)
         (rows,) = solver.limits([shot])
-        room = Values(rows.values[solver.limits.ends :], rows.slopes[solver.limits.ends :])
+        room = Values(rows.values[solver.limits.ends :], rows.jacobian[solver.limits.ends :])
         window = on_ticks(shot.window, room, cycles, self.problem.joints.limits.tick_s)
         # what is not kept yet is put right by the next window; its dwell begins with what is kept
         _, spare = solver.order_rows(window.first(cycles), 0)

@@ -33,17 +33,17 @@ class WindowShot:
     window : Window
     time_s : array (n,)
     states : array (n, nx)
-        Pose, velocity and curvatures; all of it where there are slopes.
+        Pose, velocity and curvatures; all of it where there are derivatives.
     final : array (nx,)
         All of the last state.
-    slopes : array (n, nx, unknowns) or None
+    sensitivity : array (n, nx, unknowns) or None
     """
 
     window: Window
     time_s: Array
     states: Array
     final: Array
-    slopes: Array | None = None
+    sensitivity: Array | None = None
 
 
 def shoot_windows(run: Integrator, start: Array, windows: list[Window]) -> list[WindowShot | None]:
@@ -58,7 +58,7 @@ def shoot_windows(run: Integrator, start: Array, windows: list[Window]) -> list[
     ]
 
 
-def with_slopes(run: Integrator, start: Array, shot: WindowShot) -> WindowShot:
+def with_sensitivity(run: Integrator, start: Array, shot: WindowShot) -> WindowShot:
     """Differentiate a simulated window on its own steps."""
     window, timeline = shot.window, shot.window.timeline().at_one_pressure()
     full_kpa = float(timeline.pressure_kpa[0])
@@ -84,7 +84,7 @@ def with_slopes(run: Integrator, start: Array, shot: WindowShot) -> WindowShot:
     by_pressure = np.zeros((h_s.size, window.size))
     shares = window.pressure_shares(middles)[:, 1:]
     by_pressure[:, window.size - window.cycles :] = shares * (full_kpa / kpa)[:, None]
-    slopes = carried_on(run, course, states, born, by_pressure)
+    sensitivity = carried_on(run, course, states, born, by_pressure)
     # the end of the last cycle: f there, from the last step itself
-    slopes[-1, :, window.switches + window.cycles - 1] = (states[-1] - states[-2]) / h_s[-1]
-    return replace(shot, states=states, slopes=slopes)
+    sensitivity[-1, :, window.switches + window.cycles - 1] = (states[-1] - states[-2]) / h_s[-1]
+    return replace(shot, states=states, sensitivity=sensitivity)

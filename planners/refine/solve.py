@@ -1,4 +1,4 @@
-"""One window's local optimum: sequential linear programming with exact slopes in a trust region."""
+"""One window's local optimum: sequential linear programming with exact derivatives in a trust region."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from scipy.optimize import linprog
 
 from planners.motion.valves import ValveLimits
 from planners.refine.limits import Limits, Values
-from planners.refine.shots import WindowShot, shoot_windows, with_slopes
+from planners.refine.shots import WindowShot, shoot_windows, with_sensitivity
 from planners.refine.window import Window
 from srs_opt.errors import NoAnswerError
 from srs_opt.manoeuvre.order import OrderRows
@@ -119,7 +119,7 @@ class WindowSolver:
 
         The end is missed by the square of a step, so each part is corrected once by what it misses.
         """
-        shot = with_slopes(self.run, self.start, best.shot)
+        shot = with_sensitivity(self.run, self.start, best.shot)
         (rows,) = self.limits([shot])
         step = self._step(shot.window, rows, reach, np.zeros(0))
         if step is None:
@@ -131,7 +131,7 @@ class WindowSolver:
         for f, trial in found[:-1]:
             if trial is not None:
                 ends = self.limits.ends
-                missed = trial.values.values[:ends] - rows.values[:ends] - f * rows.slopes[:ends] @ step
+                missed = trial.values.values[:ends] - rows.values[:ends] - f * rows.jacobian[:ends] @ step
                 better = self._step(shot.window, rows, f * reach, missed)
                 if better is not None:
                     again.append((f, shot.window.moved(x + better)))
@@ -147,11 +147,11 @@ class WindowSolver:
         values = rows.values.copy()
         values[: missed.size] += missed
         keep = values < 1.5 * reach + 0.005
-        values, slopes = values[keep], rows.slopes[keep]
+        values, jacobian = values[keep], rows.jacobian[keep]
         n, m, ends = window.size, values.size, window.switches + window.cycles
         by_cycles = window.by_cycles()
         cost = np.concatenate([by_cycles[ends - 1], np.full(m, PENALTY_PER_M)])
-        near = sparse.hstack([sparse.csr_matrix(-slopes @ by_cycles), -sparse.identity(m)])
+        near = sparse.hstack([sparse.csr_matrix(-jacobian @ by_cycles), -sparse.identity(m)])
         order, room = self.order_rows(window)
         order = sparse.hstack([order @ by_cycles, sparse.csr_matrix((room.size, m))])
         low, high = np.full(n + m, -reach), np.full(n + m, reach)

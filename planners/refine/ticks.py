@@ -21,7 +21,7 @@ def on_ticks(window: Window, rows: Values, cycles: int, tick_s: float) -> Window
     Parameters
     ----------
     rows : Values
-        Limits of the room and their slopes at this window.
+        Limits of the room and their derivatives at this window.
     cycles : int
         How many are rounded.
     """
@@ -35,7 +35,7 @@ def on_ticks(window: Window, rows: Values, cycles: int, tick_s: float) -> Window
         exact = x[column] / tick_s
         sides = {round(exact)} if abs(exact - round(exact)) < 1e-6 else {math.floor(exact), math.ceil(exact)}
         tried = [
-            (side * tick_s, values + rows.slopes[:, column] * (side * tick_s - x[column])) for side in sides
+            (side * tick_s, values + rows.jacobian[:, column] * (side * tick_s - x[column])) for side in sides
         ]
         near = x[column]
         x[column], values = min(

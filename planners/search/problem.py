@@ -26,6 +26,7 @@ from srs_opt.drive.calibration import NO_CALIBRATION, DriveCalibration
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait_opt.table import GaitTable
 from srs_opt.geometry import points_in_room
+from srs_opt.model.state import POSE
 from srs_opt.orbit.body import integrator
 from srs_opt.robot import Robot
 from srs_opt.simulate.batched import run_batched
@@ -215,7 +216,7 @@ class Problem:
             return trajectory
         share = trajectory.time_s / trajectory.time_s[-1]
         pose = self.bending.placed(trajectory.pose, before, gait, share)
-        return replace(trajectory, pose=pose, final=np.concatenate([pose[-1], trajectory.final[3:]]))
+        return replace(trajectory, pose=pose, final=np.concatenate([pose[-1], trajectory.final[POSE.stop :]]))
 
     def simulate(self, state: Array, before: int, gait: int) -> Cycle:
         """Return one cycle of a gait from a state of the model, after a cycle of another (or rest)."""

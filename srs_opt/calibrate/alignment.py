@@ -46,11 +46,11 @@ class Alignment:
         pairs = points.reshape(len(points), -1, 2)
         return np.asarray(pairs @ self.matrix.T + self.shift_m).reshape(points.shape)
 
-    def slopes(self, slopes: np.ndarray) -> np.ndarray:
+    def jacobian(self, jacobian: np.ndarray) -> np.ndarray:
         """Return derivatives of points, (T, 2 M, K), turned with them."""
-        frames, values, count = slopes.shape
-        pairs = slopes.reshape(frames, values // 2, 2, count)
-        turned: np.ndarray = np.einsum("ij,tmjk->tmik", self.matrix, pairs).reshape(slopes.shape)
+        frames, values, count = jacobian.shape
+        pairs = jacobian.reshape(frames, values // 2, 2, count)
+        turned: np.ndarray = np.einsum("ij,tmjk->tmik", self.matrix, pairs).reshape(jacobian.shape)
         return turned
 
     def pose(self, pose: np.ndarray) -> np.ndarray:

@@ -86,7 +86,7 @@ def entry_sd(form: Form, fit: Fit) -> dict[str, float]:
     own = [names.index(c.name) for c in free]
     values = {c.name: fit.point.values.get(c.name, c.start) for c in form.coordinates}
     keys = [p.name for p in form.effect.parameters if p is not form.effect.place]
-    slopes = np.zeros((len(keys), len(own)))
+    jacobian = np.zeros((len(keys), len(own)))
     for j, c in enumerate(free):
         h = 1e-4 * c.typical
         ends = [form.entry({**values, c.name: values[c.name] + s * h}) for s in (1, -1)]
@@ -94,8 +94,8 @@ def entry_sd(form: Form, fit: Fit) -> dict[str, float]:
             change = ends[0][key] - ends[1][key]
             if form.direction is not None and key == form.direction.name:
                 change = math.remainder(change, 2 * math.pi)
-            slopes[i, j] = change / (2 * h)
-    variances = np.diag(slopes @ fit.covariance[np.ix_(own, own)] @ slopes.T)
+            jacobian[i, j] = change / (2 * h)
+    variances = np.diag(jacobian @ fit.covariance[np.ix_(own, own)] @ jacobian.T)
     return {k: float(math.sqrt(max(v, 0.0))) for k, v in zip(keys, variances)}
 
 

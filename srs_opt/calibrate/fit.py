@@ -33,10 +33,10 @@ CONVERGED = 0.05  # of the deviance: a fifth of a standard deviation
 # deviance, and share of it, that even the linearisation promises to stay behind the one to beat
 HOPELESS, HOPELESS_SHARE = 300.0, 0.1
 TRIED = 2  # iterations before that is believed
-TRUSTED = 0.25  # of the gain that slopes promise: with no larger error they serve for the next step too
+TRUSTED = 0.25  # of the gain that derivatives promise: with no larger error they serve for the next step too
 PLAIN = 25.0  # variance inflation above which a misfit hides the errors of a simulation five times as rough
 PLAINLY = 0.01  # share of such a misfit that need not be gained
-CRAWL = 0.03  # share of the misfit; slopes of an earlier point that promise less are not worth a step
+CRAWL = 0.03  # share of the misfit; derivatives of an earlier point that promise less are not worth a step
 FAR_OFF = 3.0  # variance inflation from which on a fit does not explain the data
 LEAST_DAMPING = 0.001  # below: none
 FIRST_DAMPING = 0.02
@@ -65,7 +65,7 @@ class Measured(Protocol):
     ) -> dict[str, NormalEquations]:
         """Return the normal equations at `point`, by trial.
 
-        `stale` allows slopes of an earlier point, `rough` motions that are good enough for a plain misfit.
+        `stale` allows derivatives of an earlier point, `rough` motions good enough for a plain misfit.
         """
 
 
@@ -151,7 +151,7 @@ def fit(
         Share of the misfit beyond the noise that a fit far off may leave to be gained and still count as
         converged: what does not explain the data need not be known well.
     rough : bool
-        Whether the fit may end with slopes of an earlier point, its covariance with them.
+        Whether the fit may end with derivatives of an earlier point, its covariance with them.
 
     Raises
     ------
@@ -178,7 +178,7 @@ def fit(
 
 
 class _Descent:
-    """Steps towards the most probable point; slopes are kept while they predict what a step gains."""
+    """Steps towards the most probable point; derivatives are kept while they predict what a step gains."""
 
     def __init__(
         self,
@@ -192,13 +192,13 @@ class _Descent:
         self.correlated, self.near = correlated, near
         self.done, self.idle, self.damping = 0, 0, 0.0
         self.converged, self.behind, self.rough = False, math.inf, True
-        self.bends = True  # until slopes turn out not to be kept
+        self.bends = True  # until derivatives turn out not to be kept
         self.winding = False  # whether the last step found the valley bent
 
     def begin(self, point: Point) -> None:
         """Linearise where the fit starts, roughly where the misfit is plain."""
         self.point = point
-        # the scatter's slopes alone tell, for a third of the time
+        # the scatter's derivatives alone tell, for a third of the time
         few = [c for c in self.coordinates if c.name in SCATTER_SD] or self.coordinates
         first = self.experiment.normal_equations(point, few, self.trials, rough=True)
         self.rough = variance_inflation_of(first, self.correlated) > PLAIN
@@ -206,7 +206,7 @@ class _Descent:
         self.at_start = misfit_ratio(self.equations)
 
     def refresh(self) -> None:
-        """Take the slopes anew, from a fine simulation once the misfit does not hide a rough one."""
+        """Take the derivatives anew, from a fine simulation once the misfit does not hide a rough one."""
         self.equations = self._measured(self.point)
         if self.rough and self.variance_inflation <= PLAIN:
             self.rough = False
@@ -220,7 +220,7 @@ class _Descent:
 
     @property
     def stale(self) -> bool:
-        """Whether slopes are those of an earlier point."""
+        """Whether derivatives are those of an earlier point."""
         return any(g.stale for g in self.equations.values())
 
     @property
@@ -246,7 +246,7 @@ class _Descent:
         )
 
     def arrived(self) -> bool:
-        """Whether fresh slopes promise to gain next to nothing."""
+        """Whether fresh derivatives promise to gain next to nothing."""
         while True:
             enough, inflation = CONVERGED, self.variance_inflation
             if inflation > FAR_OFF:
@@ -269,7 +269,7 @@ class _Descent:
         return True
 
     def step(self) -> None:
-        """Go on where that gains, else take fresh slopes or damp the next step."""
+        """Go on where that gains, else take fresh derivatives or damp the next step."""
         self.done += 1
         stale, inflation, now, jitter = self.stale, self.variance_inflation, self.now(), self.jitter
         move = best_move(self.coordinates, self.equations, self.point, inflation, self.damping)
@@ -299,7 +299,7 @@ class _Descent:
             self.damping = max(self.damping * 4, FIRST_DAMPING)
 
     def _ease(self, gain: float, promised: float) -> None:
-        """Damp less where the slopes were right, more where they were not."""
+        """Damp less where the derivatives were right, more where they were not."""
         if gain < TRUSTED * promised:
             self.damping *= 2
         elif gain > (1 - TRUSTED) * promised:
@@ -363,7 +363,7 @@ class _Descent:
         return late
 
     def end(self, *, rough: bool) -> Fit:
-        """Return the fit at the point, its slopes fresh unless they need not be."""
+        """Return the fit at the point, its derivatives fresh unless they need not be."""
         if self.stale and not rough:
             self.refresh()
         return Fit(

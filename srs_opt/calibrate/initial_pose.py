@@ -25,5 +25,5 @@ def _initial_pose_function(structure: Structure) -> ca.Function:
 
 def initial_pose(structure: Structure, p: np.ndarray, heading_rad: float) -> tuple[np.ndarray, np.ndarray]:
     """Return the pose (3,) of the straight robot with its tail at the origin, and its derivative by p."""
-    pose, slope = _initial_pose_function(structure)(p, heading_rad)
-    return np.asarray(pose).ravel(), np.asarray(slope)
+    pose, jacobian = _initial_pose_function(structure)(p, heading_rad)
+    return np.asarray(pose).ravel(), np.asarray(jacobian)

@@ -75,7 +75,7 @@ class Maps:
         self.rows = {k: self.rows[k] for k in bench}
         names = [c.name for c in base]
         scattered = [names.index(n) for n in SCATTER_SD]
-        spread = {k: slopes[:, scattered] * list(SCATTER_SD.values()) for k, (_, slopes) in bench.items()}
+        spread = {k: jacobian[:, scattered] * list(SCATTER_SD.values()) for k, (_, jacobian) in bench.items()}
         own = _own_variance(self.rows, spread)
         self._whitening = {k: np.linalg.inv(_root(row, spread[k], own)) for k, row in self.rows.items()}
 
@@ -88,7 +88,7 @@ class Maps:
         stale: bool = False,
         rough: bool = False,
     ) -> dict[str, NormalEquations]:
-        """Return the normal equations of every row, the slopes always fresh and the orbits fine.
+        """Return the normal equations of every row, the derivatives always fresh and the orbits fine.
 
         Raises
         ------
@@ -101,8 +101,8 @@ class Maps:
         for k, row in self.rows.items():
             if k not in paths:
                 raise NoAnswerError(f"row {k + 1} of the maps has no steady state with these parameters")
-            value, slopes = paths[k]
-            both = self._whitening[k] @ np.column_stack([slopes, _measured(row) - value])
+            value, jacobian = paths[k]
+            both = self._whitening[k] @ np.column_stack([jacobian, _measured(row) - value])
             found[f"map row {k + 1}"] = NormalEquations(both.T @ both, 2, (), none, none)
         return found
 
@@ -154,18 +154,18 @@ def parameter_moves(
 def path(
     robot: Robot, orbit: Orbit, moves: Sequence[Mapping[str, float]], model: str | None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return speed (m/s) and curvature (1/m, + left) of a gait's path, and their slopes (2, K).
+    """Return speed (m/s) and curvature (1/m, + left) of a gait's path, and their derivatives (2, K).
 
     `moves` holds what each of K coordinates does to the model's parameters (`parameter_moves`).
     """
     forward = math.copysign(1.0, orbit.speed_m_s)
     speed, turn = abs(orbit.speed_m_s), orbit.turn_rate_rad_s
     by = sensitivity(robot, orbit, model).robot
-    slopes = np.empty((2, len(moves)))
+    jacobian = np.empty((2, len(moves)))
     for k, move in enumerate(moves):
         by_speed, by_turn = sum((by[n] * d for n, d in move.items()), np.zeros(2))
-        slopes[:, k] = forward * by_speed, (by_turn - turn / speed * forward * by_speed) / speed
-    return np.array([speed, turn / speed]), slopes
+        jacobian[:, k] = forward * by_speed, (by_turn - turn / speed * forward * by_speed) / speed
+    return np.array([speed, turn / speed]), jacobian
 
 
 def _effects_seen(robot: Robot, report: Callable[[str], None] | None) -> list[Coordinate]:

@@ -171,9 +171,9 @@ class Model:
     def seeds(self, values: Values, conditions: Conditions, coordinates: Sequence[Coordinate]) -> Packed:
         """Return the derivatives of `pack` by `coordinates`, arrays (..., coordinates)."""
         columns = [self._column[c.name] for c in coordinates]
-        self._set(self._slopes, values, conditions)
+        self._set(self._jacobian, values, conditions)
         # a buffer holds a matrix column by column
-        return Packed(*(result[columns].T.copy() for result in self._slopes.results))
+        return Packed(*(result[columns].T.copy() for result in self._jacobian.results))
 
     def default(self, name: str) -> float:
         """Return a coordinate's value where a point says nothing."""
@@ -193,7 +193,7 @@ class Model:
         return ZeroCopy(_functions(self.full, self.forms, self._names, self.camera)[0])
 
     @cached_property
-    def _slopes(self) -> ZeroCopy:
+    def _jacobian(self) -> ZeroCopy:
         return ZeroCopy(_functions(self.full, self.forms, self._names, self.camera)[1])
 
     def __getstate__(self) -> dict[str, object]:  # buffers do not travel
@@ -260,9 +260,9 @@ def _functions(
     camera = [v for name in seen for v in own[name][0].values()]
     outputs = [ca.vertcat(*p), ca.vertcat(*camera), delay, clock, rate]
     inputs = [z, bench, now]
-    slopes = [ca.densify(ca.jacobian(o, z)) for o in outputs]
+    jacobian = [ca.densify(ca.jacobian(o, z)) for o in outputs]
     options = {"cse": True}
-    return ca.Function("pack", inputs, outputs, options), ca.Function("seeds", inputs, slopes, options)
+    return ca.Function("pack", inputs, outputs, options), ca.Function("seeds", inputs, jacobian, options)
 
 
 def _over_places(

@@ -1,8 +1,8 @@
 """Normal equations of many trials, each with its own scatter, which is eliminated exactly.
 
-One trial contributes [Y r]' [Y r]/sd^2 for slopes Y and residual r; its scatter b ~ N(0, P) acts through some
-of the columns of Y. Eliminating b leaves a Gram matrix in the shared coordinates only, so that every question
-about subsets of coordinates (scores, fits, cross-validation) is algebra on small matrices.
+One trial contributes [Y r]' [Y r]/sd^2 for Jacobian Y and residual r; its scatter b ~ N(0, P) acts through
+some of the columns of Y. Eliminating b leaves a Gram matrix in the shared coordinates only, so that every
+question about subsets of coordinates (scores, fits, cross-validation) is algebra on small matrices.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class NormalEquations:
     serial : float
         Standardised sum of products of residuals a few frames apart (about unit normal for pure noise).
     stale : bool
-        Whether the slopes are those of an earlier point.
+        Whether the derivatives are those of an earlier point.
     """
 
     raw: np.ndarray
@@ -123,7 +123,7 @@ class NormalEquations:
         Parameters
         ----------
         ahead : NormalEquations
-            With the slopes of this point, the residuals of where `share` of the step leads.
+            With the derivatives of this point, the residuals of where `share` of the step leads.
         """
         both = step.copy()
         both[list(self.scattered)] += moved
@@ -164,7 +164,7 @@ class Eliminated:
 
 def trial_normal_equations(
     residual: np.ndarray,
-    slopes: np.ndarray,
+    jacobian: np.ndarray,
     whiten: Whitening,
     scattered: Sequence[int],
     scatter_sd: np.ndarray,
@@ -172,7 +172,7 @@ def trial_normal_equations(
     own: np.ndarray | None = None,
     own_sd: np.ndarray | None = None,
 ) -> NormalEquations:
-    """Return one trial's Gram matrix for residuals (n,) and slopes (n, K), (T C) in a row.
+    """Return one trial's Gram matrix for residuals (n,) and derivatives (n, K), (T C) in a row.
 
     Parameters
     ----------
@@ -181,9 +181,9 @@ def trial_normal_equations(
     own_sd : array (Q,), optional
         Priors of their amplitudes; infinite where nothing is known.
     """
-    whole = [slopes, residual[:, None]] if own is None else [slopes, residual[:, None], own]
+    whole = [jacobian, residual[:, None]] if own is None else [jacobian, residual[:, None], own]
     both = whiten(np.concatenate(whole, axis=1))
-    size = slopes.shape[1] + 1
+    size = jacobian.shape[1] + 1
     raw = both.T @ both
     left = both[:, size - 1]
     if own is not None and own_sd is not None:

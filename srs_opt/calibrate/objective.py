@@ -1,4 +1,4 @@
-"""What a fit makes small: misfit, priors, trial-to-trial scatter; and the step that the slopes ask for."""
+"""What a fit makes small: misfit, priors, trial-to-trial scatter; and the step that derivatives ask for."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def best_move(
     damping: float = 0.0,
     longest: float = LONGEST_LOG_STEP,
 ) -> Move:
-    """Return the step to the minimum that the slopes promise, the scatter within its limits.
+    """Return the step to the minimum that the derivatives promise, the scatter within its limits.
 
     A trial whose scatter would leave its limits has it held there, and the shared coordinates know: a model
     that lacks something drives scatter that far, and a step that counts on more of it would only lose.
@@ -132,7 +132,7 @@ def bent_move(
     """Return the step along the valley's bend: half the geodesic acceleration on top.
 
     After Transtrum and Sethna (2012), doi 10.48550/arXiv.1201.5885. `ahead` are the normal equations where
-    AHEAD of the step leads, with the slopes of the point.
+    AHEAD of the step leads, with the derivatives of the point.
     """
     bent = {
         n: g.bent(ahead[n], move.step, b, AHEAD) for n, (g, b) in _pairs(equations, move) if ahead[n].stale

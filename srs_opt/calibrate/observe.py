@@ -23,8 +23,9 @@ from srs_opt.model.kinematics import Chain, arc
 from srs_opt.model.mechanics import Mechanics
 from srs_opt.model.parameters import Structure, effect_symbols
 from srs_opt.model.registry import build, state_layout
-from srs_opt.model.state import StateLayout
+from srs_opt.model.state import POSE, VELOCITY, StateLayout
 from srs_opt.simulate.compiled import compiled
+from srs_opt.simulate.interpolate import hermite, linear
 
 # of a typical flexibility: as stiff as that a body moves by 0.1 % other than to first order
 ONSET = 1e-3
@@ -38,7 +39,7 @@ class Prediction:
     ----------
     points : array (T, 2 M)
         x1, y1, x2, y2 ... per frame.
-    slopes : array (T, 2 M, K)
+    jacobian : array (T, 2 M, K)
         Derivatives by the coordinates asked for.
     pose, kappa : array (T, 3), (T, N-1)
         Motion at the frames.
@@ -47,7 +48,7 @@ class Prediction:
     """
 
     points: np.ndarray
-    slopes: np.ndarray
+    jacobian: np.ndarray
     pose: np.ndarray
     kappa: np.ndarray
     free: np.ndarray | None = None
@@ -122,24 +123,6 @@ def _seen(
     return x, y
 
 
-def _hermite(time_s: np.ndarray, value: np.ndarray, rate: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Interpolate cubically with known slopes; before the start everything stands still."""
-    k = np.clip(np.searchsorted(time_s, at, side="right") - 1, 0, time_s.size - 2)
-    h = (time_s[k + 1] - time_s[k])[:, None]
-    u = np.clip((at - time_s[k])[:, None] / h, 0.0, 1.0)
-    w = 1 - u
-    left = w * w * ((1 + 2 * u) * value[k] + u * h * rate[k])
-    right = u * u * ((1 + 2 * w) * value[k + 1] - w * h * rate[k + 1])
-    return np.asarray(left + right)
-
-
-def _linear(time_s: np.ndarray, value: np.ndarray, at: np.ndarray) -> np.ndarray:
-    k = np.clip(np.searchsorted(time_s, at, side="right") - 1, 0, time_s.size - 2)
-    u = np.clip((at - time_s[k]) / (time_s[k + 1] - time_s[k]), 0.0, 1.0)
-    u = u.reshape(-1, *[1] * (value.ndim - 1))
-    return np.asarray((1 - u) * value[k] + u * value[k + 1])
-
-
 def predict(
     model: Model,
     trial: Trial,
@@ -158,10 +141,10 @@ def predict(
     """
     at = trial.time_s * (1 + nodes.clock_rate) + nodes.clock_s
     rate = _pose_rate(model, nodes, values)
-    pose = _hermite(nodes.time_s, nodes.body[:, :3], rate, at)
+    pose = hermite(nodes.time_s, nodes.body[:, :3], rate, at)
     structure, kept = model.structure(values, coordinates)
     layout = state_layout(structure)
-    shape = _hermite(nodes.time_s, nodes.shape(layout), nodes.shape_rate(layout), at)
+    shape = hermite(nodes.time_s, nodes.shape(layout), nodes.shape_rate(layout), at)
     kappa = shape[:, : model.segments]
     spots = None if centre_only else trial.spots
     function = _picture(structure, centre_only, spots, model.camera)
@@ -169,9 +152,9 @@ def predict(
         function, (pose, shape), nodes.camera, nodes.p[kept]
     )
     frames, seen = points.shape
-    slopes = np.zeros((frames, seen, len(coordinates)))
+    jacobian = np.zeros((frames, seen, len(coordinates)))
     if not coordinates:
-        return Prediction(points, slopes, pose, kappa)
+        return Prediction(points, jacobian, pose, kappa)
     by = model.seeds(values, conditions_of(trial), coordinates)
     seeds = by.p[kept]
     softening = np.array([model.softens(c, values) for c in coordinates])
@@ -181,32 +164,32 @@ def predict(
     if moving.size:
         typical = np.array([coordinates[int(k)].typical for k in moving])
         varied = variation(structure, nodes, nodes.p[kept], seeds[:, moving], typical, trial.heading_rad)
-        part = jac_pose @ _linear(nodes.time_s, varied.pose, at)
-        part += jac_shape @ _linear(nodes.time_s, varied.shape, at)
+        part = jac_pose @ linear(nodes.time_s, varied.pose, at)
+        part += jac_shape @ linear(nodes.time_s, varied.shape, at)
         jac_p = by_p.reshape(frames, -1, seen).transpose(0, 2, 1)
         touched = np.any(seeds != 0, axis=1) & np.any(by_p.reshape(frames, -1, seen) != 0, axis=(0, 2))
         part += jac_p[:, :, touched] @ seeds[touched][:, moving]
-        slopes[:, :, moving] = part
+        jacobian[:, :, moving] = part
     for k in np.flatnonzero(softening):
         began, soft, p = _onset(model, trial, nodes, values, coordinates[int(k)])
         by_bend = jac_shape
         if (bent := state_layout(soft)).stretches:  # lengths follow the pressure, not the bend
-            loaded = _hermite(nodes.time_s, nodes.shape(bent), nodes.shape_rate(bent), at)
+            loaded = hermite(nodes.time_s, nodes.shape(bent), nodes.shape_rate(bent), at)
             picture = _picture(soft, centre_only, spots, model.camera)
             by_bend = evaluate(picture, (pose, loaded), nodes.camera, p)[2]
             by_bend = by_bend.reshape(frames, -1, seen).transpose(0, 2, 1)
-        slopes[:, :, k] = (jac_pose @ _linear(nodes.time_s, began.pose, at))[..., 0]
-        slopes[:, :, k] += (by_bend @ _linear(nodes.time_s, began.shape, at))[..., 0]
+        jacobian[:, :, k] = (jac_pose @ linear(nodes.time_s, began.pose, at))[..., 0]
+        jacobian[:, :, k] += (by_bend @ linear(nodes.time_s, began.shape, at))[..., 0]
     jac_camera = by_camera.reshape(frames, -1, seen).transpose(0, 2, 1)
     velocity = _velocity(nodes, layout, rate, at)
     in_time = jac_pose @ velocity[0][..., None] + jac_shape @ velocity[1][..., None]
     later = (by.clock_s - by.delay_s)[0]  # a delay of the valves shifts the motion in time
-    slopes[:, :, later != 0] += in_time * later[later != 0]
+    jacobian[:, :, later != 0] += in_time * later[later != 0]
     faster = by.clock_rate[0]
-    slopes[:, :, faster != 0] += in_time * trial.time_s[:, None, None] * faster[faster != 0]
+    jacobian[:, :, faster != 0] += in_time * trial.time_s[:, None, None] * faster[faster != 0]
     shown = np.any(by.camera != 0, axis=0)
-    slopes[:, :, shown] += jac_camera @ by.camera[:, shown]
-    return Prediction(points, slopes, pose, kappa)
+    jacobian[:, :, shown] += jac_camera @ by.camera[:, shown]
+    return Prediction(points, jacobian, pose, kappa)
 
 
 def _onset(
@@ -224,7 +207,7 @@ def _pose_rate_function(structure: Structure) -> ca.Function:
     def make() -> ca.Function:
         parameters, m, _ = build(structure)
         body = ca.SX.sym("body", 6)
-        rate = m.pose_rate(body[:3], body[3:])
+        rate = m.pose_rate(body[POSE], body[VELOCITY])
         inputs = [body, m.shape, m.shape_rate, parameters.vector]
         return mapped(ca.Function("rate", inputs, [rate], {"cse": True}), (3,))
 
@@ -244,6 +227,6 @@ def _velocity(
     """Return the rates of pose and shape at the frames; none before the start."""
     moving = (at >= 0)[:, None]
     return (
-        np.asarray(_linear(nodes.time_s, rate, at) * moving),
-        np.asarray(_linear(nodes.time_s, nodes.shape_rate(layout), at) * moving),
+        np.asarray(linear(nodes.time_s, rate, at) * moving),
+        np.asarray(linear(nodes.time_s, nodes.shape_rate(layout), at) * moving),
     )

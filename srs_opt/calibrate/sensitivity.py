@@ -22,7 +22,7 @@ from srs_opt.simulate.integrate import step_kernel
 from srs_opt.simulate.kernel import LANES, Course, Kernel
 from srs_opt.simulate.rosenbrock import BODY_STATES
 
-# of a coordinate's typical size: rounding then costs 1e-8 of a slope, and the bend of a motion through the
+# of a coordinate's typical size: rounding then costs 1e-8 of a derivative, the bend of a motion through the
 # steepest friction 1e-4
 HAIR = 1e-7
 
@@ -76,8 +76,8 @@ def variation(
         unmoved = np.concatenate([nodes.body[:, :3], nodes.shape(layout)], axis=1)[..., None]
     else:
         unmoved, moved = moved[..., :1], moved[..., 1:]
-    slopes = (moved - unmoved) / hair
-    return Variation(slopes[:, :3], slopes[:, 3:])
+    jacobian = (moved - unmoved) / hair
+    return Variation(jacobian[:, :3], jacobian[:, 3:])
 
 
 def _start(structure: Structure, nodes: Nodes) -> np.ndarray:
@@ -109,8 +109,8 @@ def onset(
     start, h = layout.adopt(nodes.start, rigid), np.diff(nodes.time_s)
     courses = [Course(start, h, nodes.valve, p) for p in flexible]
     moved = _motions(step_kernel(structure), courses, layout)
-    slopes = (moved[..., 1:] - moved[..., :1]) / difference
-    return Variation(slopes[:, :3], slopes[:, 3:])
+    jacobian = (moved[..., 1:] - moved[..., :1]) / difference
+    return Variation(jacobian[:, :3], jacobian[:, 3:])
 
 
 def _motions(kernel: Kernel, courses: Sequence[Course], layout: StateLayout) -> np.ndarray:

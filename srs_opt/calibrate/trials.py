@@ -1,4 +1,4 @@
-"""Trials that are simulated again and again: each goes on from its own last mesh, slopes and motion.
+"""Trials that are simulated again and again: each goes on from its own last mesh, derivatives and motion.
 
 What a trial answers depends on its own earlier requests only, not on those of others, nor on their failures:
 so the answers are the same to the last bit whoever simulates which trials.
@@ -69,8 +69,8 @@ class Request:
     extra : callable, optional
         Residual functions, as further columns.
     stale : bool
-        Whether slopes of the last request for the same coordinates serve, wherever that was. Those of the
-        same place always do.
+        Whether derivatives of the last request for the same coordinates serve, wherever that was. Those of
+        the same place always do.
     rough : bool
         Whether the motions need not be better than a model can say that leaves a plain misfit.
     noise : Noise, optional
@@ -86,8 +86,8 @@ class Request:
 
 
 @dataclass(frozen=True)
-class Slopes:
-    """A trial's slopes where they were last taken.
+class KeptJacobian:
+    """A trial's derivatives where they were last taken.
 
     Attributes
     ----------
@@ -103,7 +103,7 @@ class Slopes:
     values: np.ndarray
 
 
-Memory = tuple[Meshes, Place | None, dict[bool, Slopes]]
+Memory = tuple[Meshes, Place | None, dict[bool, KeptJacobian]]
 
 
 class Trials:
@@ -117,7 +117,7 @@ class Trials:
     tolerance_m_s : float
         Of the simulation.
     keeps : bool
-        Whether slopes and motions are kept for the next request.
+        Whether derivatives and motions are kept for the next request.
     """
 
     def __init__(
@@ -128,9 +128,9 @@ class Trials:
         self.runs = {t.name: TrialRun(model, t) for t in trials}
         self._tracks = {t.name: track_of(t) for t in trials}
         self._whitenings: dict[str, tuple[Noise, Whitening]] = {}
-        # trial -> the last slopes of requests without residual functions, and with them
-        self._slopes: dict[str, dict[bool, Slopes]] = {t.name: {} for t in trials}
-        self._new_slopes: set[tuple[str, bool]] = set()
+        # trial -> the last derivatives of requests without residual functions, and with them
+        self._jacobian: dict[str, dict[bool, KeptJacobian]] = {t.name: {} for t in trials}
+        self._new_jacobians: set[tuple[str, bool]] = set()
         self._motions: dict[str, tuple[Place, Nodes]] = {}
         self._last: dict[str, Place] = {}
         self._scatter_sd = np.array(list(SCATTER_SD.values()))
@@ -147,31 +147,31 @@ class Trials:
         return Trials(self.model, trials, self.noise, self.tolerance_m_s, keeps=self.keeps)
 
     def memory(self, names: Sequence[str], request: Request | None) -> dict[str, Memory]:
-        """Return what the trials go on from: with slopes if `request` uses them, or those that are new."""
+        """Return what the trials go on from: with a Jacobian if `request` uses it, or one that is new."""
 
-        def wanted(name: str, wide: bool, kept: Slopes) -> bool:
+        def wanted(name: str, wide: bool, kept: KeptJacobian) -> bool:
             if request is None:
-                return (name, wide) in self._new_slopes
+                return (name, wide) in self._new_jacobians
             return _serve(kept, request, wide) or kept.place == self._place(name, request)
 
         return {
             n: (
                 self.runs[n].meshes,
                 self._last.get(n),
-                {wide: kept for wide, kept in self._slopes[n].items() if wanted(n, wide, kept)},
+                {wide: kept for wide, kept in self._jacobian[n].items() if wanted(n, wide, kept)},
             )
             for n in names
         }
 
     def remember(self, memory: Mapping[str, Memory]) -> None:
         """Go on from there."""
-        for name, (meshes, last, slopes) in memory.items():
+        for name, (meshes, last, jacobian) in memory.items():
             self.runs[name].meshes = dict(meshes)
             self._motions.pop(name, None)
             if last is not None:
                 self._last[name] = last
-            self._slopes[name] |= slopes
-        self._new_slopes = set()
+            self._jacobian[name] |= jacobian
+        self._new_jacobians = set()
 
     def answer(self, names: Sequence[str], request: Request) -> dict[str, Answer]:
         """Return the trials' normal equations or residuals (T, 2 M), or why there are none; side by side."""
@@ -209,7 +209,7 @@ class Trials:
         found, free = align(track, lambda shift: seen_of(later(shift), nodes, values).points, most)
         raw = seen_of(later(found.later_s), nodes, values, coordinates)
         return Prediction(
-            found.points(raw.points), found.slopes(raw.slopes), found.pose(raw.pose), raw.kappa, free
+            found.points(raw.points), found.jacobian(raw.jacobian), found.pose(raw.pose), raw.kappa, free
         )
 
     def _place(self, name: str, request: Request) -> Place:
@@ -253,34 +253,34 @@ class Trials:
         point, extra = request.point, request.extra
         names = tuple(c.name for c in request.coordinates)
         wide, here = extra is not None, self._place(name, request)
-        kept = self._slopes[name].get(wide)
+        kept = self._jacobian[name].get(wide)
         served = kept is not None and kept.place != here and _serve(kept, request, wide)
-        known = {k: v for s in self._slopes[name].values() if s.place == here for k, v in _columns(s)}
+        known = {k: v for s in self._jacobian[name].values() if s.place == here for k, v in _columns(s)}
         if served:
             assert kept is not None
             known = dict(_columns(kept))
         missing = [c for c in request.coordinates if c.name not in known]
         prediction = self._predicted(name, nodes, point, missing)
         residual = np.asarray(track - prediction.points)
-        new = prediction.slopes.reshape(residual.size, -1)
+        new = prediction.jacobian.reshape(residual.size, -1)
         known |= {c.name: new[:, k] for k, c in enumerate(missing)}
-        slopes = np.stack([known[n] for n in names], axis=1)
-        if not (np.isfinite(prediction.points).all() and np.isfinite(slopes).all()):
+        jacobian = np.stack([known[n] for n in names], axis=1)
+        if not (np.isfinite(prediction.points).all() and np.isfinite(jacobian).all()):
             # an integration on the edge of breaking down ends, and has no derivatives: no place for a fit
             return NoAnswerError(f"trial {name}: the motion has no finite derivatives there")
         if self.keeps and not served:
-            self._slopes[name][wide] = Slopes(here, names, slopes.astype(np.float32))
-            self._new_slopes.add((name, wide))
+            self._jacobian[name][wide] = KeptJacobian(here, names, jacobian.astype(np.float32))
+            self._new_jacobians.add((name, wide))
         if extra is not None:
             further = extra(self._trials[name], prediction).reshape(residual.size, -1)
-            slopes = np.column_stack([slopes, further])
+            jacobian = np.column_stack([jacobian, further])
         noise = request.noise or self.noise
         own, own_sd = self._own(name, prediction, noise)
         scattered = [names.index(n) for n in SCATTER_SD]
         now = point.scatter.get(name, np.zeros(len(SCATTER_SD)))
         whiten = self._whitening(name, noise)
         normal = trial_normal_equations(
-            residual.ravel(), slopes, whiten, scattered, self._scatter_sd, now, own, own_sd
+            residual.ravel(), jacobian, whiten, scattered, self._scatter_sd, now, own, own_sd
         )
         return replace(normal, stale=served)
 
@@ -309,13 +309,13 @@ class Trials:
         return known[1]
 
 
-def _serve(kept: Slopes, request: Request, wide: bool) -> bool:
-    """Whether kept slopes serve although they are those of another place."""
+def _serve(kept: KeptJacobian, request: Request, wide: bool) -> bool:
+    """Whether kept derivatives serve although they are those of another place."""
     asked = None if request.coordinates is None else tuple(c.name for c in request.coordinates)
     return request.stale and wide == (request.extra is not None) and kept.names == asked
 
 
-def _columns(kept: Slopes) -> Iterator[tuple[str, np.ndarray]]:
+def _columns(kept: KeptJacobian) -> Iterator[tuple[str, np.ndarray]]:
     return zip(kept.names, kept.values.T)
 
 

@@ -1,4 +1,4 @@
-"""The linear map that makes a trial's noise white and of unit variance, for residuals and slopes alike.
+"""The linear map that makes a trial's noise white and of unit variance, for residuals and derivatives alike.
 
 White noise and an Ornstein-Uhlenbeck process per coordinate: with a = exp(-dt/tau) the differences
 u_i = y_i - a_i y_(i-1) have a tridiagonal covariance, whatever frames are missing, so that its Cholesky

@@ -1,7 +1,7 @@
 """After an unknown gap: the term of the grammar that describes it, if one does and no other does as well.
 
 The listed effects have failed, so the gap is mostly large: calibration alone has bent the robot's values for
-it, and what the slopes there say of a term can be far from what the term does. So terms are screened about
+it, and what derivatives there say of a term can be far from what the term does. So terms are screened about
 the bench's values too, the best of both screens are fitted to the start of a few trials, and the one that
 leaves least is exchanged for others while that helps.
 """

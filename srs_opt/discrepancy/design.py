@@ -126,12 +126,12 @@ def _instrument_gain(
 def _reading_variance(expected: Callable[[Mapping[str, float]], float], h: Hypothesis) -> float:
     """Return how well a hypothesis knows what the instrument will show, as a variance, to first order."""
     values = h.fit.point.values
-    slopes = np.zeros(len(h.fit.coordinates))
+    jacobian = np.zeros(len(h.fit.coordinates))
     for k, c in enumerate(h.fit.coordinates):
         step = 1e-4 * c.typical
         ends = [expected({**values, c.name: values[c.name] + s * step}) for s in (1, -1)]
-        slopes[k] = (ends[0] - ends[1]) / (2 * step)
-    return float(slopes @ h.fit.covariance @ slopes)
+        jacobian[k] = (ends[0] - ends[1]) / (2 * step)
+    return float(jacobian @ h.fit.covariance @ jacobian)
 
 
 def proposals(experiment: Experiment, trials: Sequence[Trial]) -> Mapping[str, Trial]:

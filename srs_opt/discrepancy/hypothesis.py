@@ -89,7 +89,7 @@ class Hypothesis:
         return ""
 
     def close_to(self, earlier: Hypothesis) -> bool:
-        """Whether the fit lies within what it is known to of an earlier one: slopes hardly differ."""
+        """Whether the fit lies within what it is known to of an earlier one: derivatives hardly differ."""
         was, now = earlier.fit.point.values, self.fit.point.values
         return all(abs(now[n] - was[n]) <= sd for n, sd in self.fit.sd.items())
 

@@ -28,7 +28,7 @@ def promising(current: Diagnostics, depth: int, family: int) -> list[Score]:
     ]
     if inflation < FAR_OFF:  # expected sizes can be believed
         scores = [s for s in scores if s.relative_size >= TELLING]
-    far = inflation > 1  # nearer, a little bending's slopes hold as all others do
+    far = inflation > 1  # nearer, a little bending's derivatives hold as all others do
     leaps = [s for s in current.scores if far and s.candidate.form.effect.bends]
     scores = [s for s in scores if s not in leaps]
     if not scores:

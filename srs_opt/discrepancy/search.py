@@ -46,7 +46,7 @@ HOPELESS = 0.1  # share of the gap that the best known effects leave, from which
 # of its typical size, from which a fit of what linearisation does not see begins; a fifth and the whole find
 # the same flexibility between 50 and 500 1/(N m^2), a tenth takes twice the iterations
 LEAP = 0.35
-NEARER = 0.2  # of the size that slopes promise, from which a refit that got lost is begun again
+NEARER = 0.2  # of the size that derivatives promise, from which a refit that got lost is begun again
 # refits with the best of the screen before one with a bending body, which costs as much as three of others
 BEFORE_BENDING = 2
 FIRM = 10.0  # standard deviations from zero at which an effect is not superfluous, without a refit
@@ -178,7 +178,7 @@ class Search:
     def examine(self, hypothesis: Hypothesis, *, stale: bool = False) -> Diagnostics:
         """Linearise about a fitted hypothesis, test what is left and screen what could explain it.
 
-        With `stale` the slopes of the last examination serve, if it was of the same effects.
+        With `stale` the derivatives of the last examination serve, if it was of the same effects.
         """
         known = self._examined
         if known is not None and known.hypothesis is hypothesis:
@@ -353,7 +353,7 @@ class Search:
         """Return where to begin a refit with a candidate added.
 
         A body that begins to bend under load moves otherwise before it is as soft as the real one: what
-        calibration made of that (half the friction) hides it from the slopes about a rigid body. So it is
+        calibration made of that (half the friction) hides it from derivatives about a rigid body. So it is
         begun with soft, at the bench's values.
         """
         if not score.candidate.form.effect.bends:

@@ -14,6 +14,7 @@ from srs_opt.gait_opt.objectives.built_in import TRANSPORT
 from srs_opt.gait_opt.objectives.cycle import SAMPLES
 from srs_opt.gait_opt.objectives.objective import Objective, formulas
 from srs_opt.orbit.steady import Orbit
+from srs_opt.simulate.interpolate import linear
 
 _PENALTY = 5.0
 _LEVER_M = 0.1
@@ -71,7 +72,7 @@ def evaluated(
     curvature = np.zeros((gait.segments, SAMPLES))
     if aim.uses_curvature:
         at = (first_s + np.arange(SAMPLES) / SAMPLES * gait.period_s) % gait.period_s
-        curvature = np.stack([np.interp(at, orbit.time_s, row) for row in orbit.kappa.T])
+        curvature = linear(orbit.time_s, orbit.kappa, at).T
     return aim(scalars, switches_of(gait, first_s), curvature)
 
 

@@ -12,6 +12,7 @@ from srs_opt.gait_opt.collocation.explain import explained
 from srs_opt.gait_opt.collocation.guess import gait_from, switches_of, unknowns_from_orbits
 from srs_opt.gait_opt.collocation.layout import WEIGHTS, Mesh
 from srs_opt.gait_opt.collocation.phases import Cuts, exchanged, phase_cuts, phase_times, switch_order
+from srs_opt.gait_opt.collocation.point import AHEAD, ASIDE
 from srs_opt.gait_opt.collocation.problem import CycleProblem
 from srs_opt.gait_opt.collocation.program import Program
 from srs_opt.gait_opt.collocation.refine import defects, refined_cuts
@@ -138,7 +139,7 @@ def _path_speeds(
         speed, turn = (float(z[p.layout.unknown(r, name)]) for name in _MOTION)
         if abs(turn) * STRAIGHT_RADIUS_M > abs(speed):
             states = z[p.layout.states(r)].reshape(p.layout.points, -1) * scales[r]
-            ahead, aside = states[:, 4], states[:, 5]
+            ahead, aside = states[:, AHEAD], states[:, ASIDE]
             distance = float(weights @ np.hypot(ahead, aside - speed / turn))
             speed = float(np.copysign(abs(turn) * distance, speed))
         speeds.append(speed)

@@ -11,7 +11,7 @@ from srs_opt.manoeuvre.rows import RowMaker
 from srs_opt.manoeuvre.shooting import Shot
 from srs_opt.manoeuvre.task import Task
 from srs_opt.manoeuvre.valves import ValvePlan
-from srs_opt.model.state import POSE
+from srs_opt.model.state import POSE, VELOCITY
 from srs_opt.simulate.integrate import TOLERANCE_M_S, Integrator, Trajectory
 
 FINER = 16.0
@@ -106,6 +106,6 @@ def certify(run: Integrator, task: Task, plan: ValvePlan) -> tuple[Certificate, 
 def seen_states(run: Integrator, path: Trajectory) -> np.ndarray:
     """Return the states (n, nx) that constraints look at: pose, velocity and curvatures."""
     states = np.zeros((path.time_s.size, run.states))
-    states[:, :3], states[:, 3:6] = path.pose, path.velocity
+    states[:, POSE], states[:, VELOCITY] = path.pose, path.velocity
     states[:, run.layout.kappa] = path.kappa
     return states

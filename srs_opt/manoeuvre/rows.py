@@ -29,18 +29,18 @@ BEND_M2 = 0.03  # turns curvatures into lengths, likewise
 SPARE_M = 1e-4  # beyond a line, heading or wall, for the integration's error and ticks: 0.2 ms of way
 LOOK_S = 0.01  # between instants at which the body is measured; it moves 5 mm meanwhile
 _HAIR = 1e-6
-Part = tuple[np.ndarray, np.ndarray]  # values and slopes
+Part = tuple[np.ndarray, np.ndarray]  # values and derivatives
 
 
 @dataclass(frozen=True)
 class Rows:
-    """Constraints in lengths (m): values (n,), to be at least 0, and slopes (n, m) (None where not asked).
+    """Constraints in lengths (m): values (n,), to be at least 0, and Jacobian (n, m) (None where not asked).
 
-    The columns are those of `Shot.slopes` and one more: the radius of the disc that holds the body.
+    The columns are those of `Shot.sensitivity` and one more: the radius of the disc that holds the body.
     """
 
     values: np.ndarray
-    slopes: np.ndarray | None
+    jacobian: np.ndarray | None
 
 
 class RowMaker:
@@ -54,26 +54,26 @@ class RowMaker:
         """Return the rows of a simulated manoeuvre."""
         parts = [*self._end(shot), *self._on_the_way(shot, self.looks(shot), radius_m)]
         values = np.concatenate([np.atleast_1d(v) for v, _ in parts])
-        if shot.slopes is None:
+        if shot.sensitivity is None:
             return Rows(values, None)
         return Rows(values, np.vstack([np.atleast_2d(s) for _, s in parts]))
 
     def end_values(self, shot: Shot) -> np.ndarray:
-        """Return what the end asks for, without slopes, (n,)."""
-        return np.array([value for value, _ in self._end(replace(shot, slopes=None))])
+        """Return what the end asks for, without derivatives, (n,)."""
+        return np.array([value for value, _ in self._end(replace(shot, sensitivity=None))])
 
     def space_values(self, shot: Shot, looked: np.ndarray) -> np.ndarray:
         """Return by how much the body keeps to its room at the nodes `looked`, (n,)."""
         room = replace(self.task, objective="time", bounds=replace(self.task.bounds, max_curvature_1_m=None))
         maker = RowMaker(self.run, room, self.inside)
-        parts = maker._on_the_way(replace(shot, slopes=None), looked, 0.0)
+        parts = maker._on_the_way(replace(shot, sensitivity=None), looked, 0.0)
         return np.concatenate([np.zeros(0), *(values for values, _ in parts)])
 
     def _linear(self, shot: Shot, node: int, weights: np.ndarray, offset: float) -> Part:
         value = np.asarray(weights @ shot.states[node] + offset)
-        if shot.slopes is None:
+        if shot.sensitivity is None:
             return value, np.zeros(0)
-        return value, np.append(weights @ shot.slopes[node], 0.0)
+        return value, np.append(weights @ shot.sensitivity[node], 0.0)
 
     def _band(self, shot: Shot, index: int, wanted: float, tolerance: float, unit: float) -> list[Part]:
         """Return two rows: a final state lies within a tolerance of what is wanted."""
@@ -118,47 +118,47 @@ class RowMaker:
         if task.end.within_m is not None:
             rows.append(self._near_start(shot, looked, task.end.within_m))
         if task.space is not None or task.objective == "space":
-            points, slopes = self.points(shot, looked)
+            points, jacobian = self.points(shot, looked)
             half = self.run.robot.body_width_m / 2
             flat = points.reshape(-1, 2)
             if task.space is not None:
                 depth, toward = task.space.depth(flat)
-                rows.append((depth - half - self.spare_m, self._chain(toward, slopes)))
+                rows.append((depth - half - self.spare_m, self._chain(toward, jacobian)))
             if task.objective == "space":
                 centre = self.centre(points)
                 away = flat - centre
                 distance = np.hypot(*away.T)
-                slope = self._chain(-away / np.maximum(distance, 1e-9)[:, None], slopes)
-                if slope.size:
-                    slope[:, -1] = 1.0
-                rows.append((radius_m - distance - half, slope))
+                by_unknowns = self._chain(-away / np.maximum(distance, 1e-9)[:, None], jacobian)
+                if by_unknowns.size:
+                    by_unknowns[:, -1] = 1.0
+                rows.append((radius_m - distance - half, by_unknowns))
         most = task.bounds.max_curvature_1_m
         if most is not None:
             for index in range(self.run.layout.kappa.start, self.run.layout.kappa.stop):
                 for sign in (1.0, -1.0):
                     values = BEND_M2 * (most - sign * shot.states[looked, index])
-                    slope = np.zeros((looked.size, 0))
-                    if shot.slopes is not None:
-                        slope = -sign * BEND_M2 * shot.slopes[looked, index]
-                        slope = np.column_stack([slope, np.zeros(looked.size)])
-                    rows.append((values, slope))
+                    by_unknowns = np.zeros((looked.size, 0))
+                    if shot.sensitivity is not None:
+                        by_unknowns = -sign * BEND_M2 * shot.sensitivity[looked, index]
+                        by_unknowns = np.column_stack([by_unknowns, np.zeros(looked.size)])
+                    rows.append((values, by_unknowns))
         return rows
 
     def _near_start(self, shot: Shot, looked: np.ndarray, radius: float) -> Part:
         away = shot.states[looked, :2] - self.task.start.state[PLACE]
         distance = np.hypot(*away.T)
-        slope = np.zeros((looked.size, 0))
-        if shot.slopes is not None:
+        by_unknowns = np.zeros((looked.size, 0))
+        if shot.sensitivity is not None:
             toward = -away / np.maximum(distance, 1e-9)[:, None]
-            slope = np.einsum("nk,nkm->nm", toward, shot.slopes[looked, :2])
-            slope = np.column_stack([slope, np.zeros(looked.size)])
-        return radius - distance - self.spare_m, slope
+            by_unknowns = np.einsum("nk,nkm->nm", toward, shot.sensitivity[looked, :2])
+            by_unknowns = np.column_stack([by_unknowns, np.zeros(looked.size)])
+        return radius - distance - self.spare_m, by_unknowns
 
     @staticmethod
-    def _chain(toward: np.ndarray, slopes: np.ndarray | None) -> np.ndarray:
-        if slopes is None:
+    def _chain(toward: np.ndarray, jacobian: np.ndarray | None) -> np.ndarray:
+        if jacobian is None:
             return np.zeros((len(toward), 0))
-        flat = slopes.reshape(-1, 2, slopes.shape[-1])
+        flat = jacobian.reshape(-1, 2, jacobian.shape[-1])
         return np.column_stack([np.einsum("nk,nkm->nm", toward, flat), np.zeros(len(flat))])
 
     @staticmethod
@@ -177,36 +177,36 @@ class RowMaker:
         return np.unique(np.searchsorted(shot.time_s, wanted - 1e-9).clip(max=shot.time_s.size - 1))
 
     def points(self, shot: Shot, looked: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
-        """Return the centre lines (n, points, 2) in the room and their slopes (n, points, 2, m)."""
-        moved = None if shot.slopes is None else shot.slopes[looked]
+        """Return the centre lines (n, points, 2) in the room and their derivatives (n, points, 2, m)."""
+        moved = None if shot.sensitivity is None else shot.sensitivity[looked]
         return body_points(self.run, shot.states[looked], moved)
 
 
 def body_points(
     run: Integrator, states: np.ndarray, moved: np.ndarray | None
 ) -> tuple[np.ndarray, np.ndarray | None]:
-    """Return the centre lines (n, points, 2) in the room and their slopes (n, points, 2, m).
+    """Return the centre lines (n, points, 2) in the room and their derivatives (n, points, 2, m).
 
     Parameters
     ----------
     states : array (n, nx)
     moved : array (n, nx, m) or None
-        Their slopes, where those of the lines are asked for.
+        Their derivatives, where those of the lines are asked for.
     """
     kappa, heading = states[:, run.layout.kappa], states[:, HEADING]
     line = centre_lines(run, kappa)
     points = points_in_room(line, states[:, POSE])
     if moved is None:
         return points, None
-    slopes = np.repeat(moved[:, None, :2], line.shape[1], axis=1)
+    jacobian = np.repeat(moved[:, None, :2], line.shape[1], axis=1)
     arm = points - states[:, None, PLACE]
     turned = np.stack([-arm[..., 1], arm[..., 0]], axis=-1)
-    slopes = slopes + turned[..., None] * moved[:, None, None, 2]
+    jacobian = jacobian + turned[..., None] * moved[:, None, None, 2]
     for k in range(kappa.shape[1]):
         hair = np.zeros(kappa.shape[1])
         hair[k] = _HAIR
         bent = (centre_lines(run, kappa + hair) - centre_lines(run, kappa - hair)) / (2 * _HAIR)
         gx, gy = rotate(heading[:, None], bent[..., 0], bent[..., 1])
         by_kappa = moved[:, run.layout.kappa.start + k]
-        slopes += np.stack([gx, gy], axis=-1)[..., None] * by_kappa[:, None, None]
-    return points, slopes
+        jacobian += np.stack([gx, gy], axis=-1)[..., None] * by_kappa[:, None, None]
+    return points, jacobian

@@ -23,7 +23,7 @@ from srs_opt.simulate.kernel import LANES, Course, Kernel
 from srs_opt.simulate.mesh import Mesh
 from srs_opt.simulate.rosenbrock import step_function
 
-# Out of rest slopes err by 20 % with 2.5 ms, by 1 % with 1 ms; with coarser ones optima are 0.5 to 2 % worse
+# Out of rest derivatives err by 20 % with 2.5 ms, by 1 % with 1 ms; coarser ones cost 0.5 to 2 % of the merit
 STEP_S = 0.00125
 Born = dict[int, list[tuple[int, np.ndarray]]]
 
@@ -38,7 +38,7 @@ class Shot:
     time_s : array (n,)
         Nodes from 0 to the end.
     states : array (n, nx)
-    slopes : array (n, nx, m) or None
+    sensitivity : array (n, nx, m) or None
         Derivatives of the states at these instants by every switch time (as `ValvePlan.times` orders them),
         the duration (nonzero at the last node only) and the pressure.
     """
@@ -46,7 +46,7 @@ class Shot:
     plan: ValvePlan
     time_s: np.ndarray
     states: np.ndarray
-    slopes: np.ndarray | None = None
+    sensitivity: np.ndarray | None = None
 
 
 @lru_cache(maxsize=16)
@@ -59,8 +59,8 @@ def jacobian_kernel(structure: Structure) -> Kernel:
         unused = ca.SX.sym("unused", x.numel() * (x.numel() + 1))
         pressure = build(structure)[0].names.index("pressure_kpa")
         following, error = step(x, valve, h, p)
-        slope = ca.densify(ca.jacobian(following, ca.vertcat(x, p[pressure])))
-        both = ca.vertcat(following, ca.vec(slope))
+        jacobian = ca.densify(ca.jacobian(following, ca.vertcat(x, p[pressure])))
+        both = ca.vertcat(following, ca.vec(jacobian))
         return ca.Function("jacobian", [ca.vertcat(x, unused), valve, h, p], [both, error], {"cse": True})
 
     nx, count = state_layout(structure).size, build(structure)[0].vector.numel()
@@ -80,7 +80,9 @@ def shoot(run: Integrator, start: np.ndarray, plans: list[ValvePlan], step_s: fl
     return shots
 
 
-def shoot_with_slopes(run: Integrator, start: np.ndarray, plan: ValvePlan, step_s: float = STEP_S) -> Shot:
+def shoot_with_sensitivity(
+    run: Integrator, start: np.ndarray, plan: ValvePlan, step_s: float = STEP_S
+) -> Shot:
     """Simulate a manoeuvre and differentiate it."""
     course = _course(run, start, plan, step_s)
     found, _ = run.kernel.run([course])
@@ -103,10 +105,10 @@ def shoot_with_slopes(run: Integrator, start: np.ndarray, plan: ValvePlan, step_
             column += 1
     by_pressure = np.zeros((course.h_s.size, m))
     by_pressure[:, -1] = 1.0
-    slopes = carried_on(run, course, states, born, by_pressure)
+    sensitivity = carried_on(run, course, states, born, by_pressure)
     # f at the end, from the last step itself: a finite difference would see the step's curvature
-    slopes[-1, :, -2] = (states[-1] - states[-2]) / course.h_s[-1]
-    return Shot(plan, time, states, slopes)
+    sensitivity[-1, :, -2] = (states[-1] - states[-2]) / course.h_s[-1]
+    return Shot(plan, time, states, sensitivity)
 
 
 def carried_on(
@@ -126,13 +128,13 @@ def carried_on(
     """
     nx, m = run.states, by_pressure.shape[1]
     jacobians = _jacobians(run, course, states)
-    slopes = np.zeros((len(states), nx, m))
+    sensitivity = np.zeros((len(states), nx, m))
     for node, jacobian in enumerate(jacobians):
         for column, jump in born.get(node, ()):
-            slopes[node, :, column] += jump
-        slopes[node + 1] = jacobian[:, :nx] @ slopes[node]
-        slopes[node + 1] += jacobian[:, nx, None] * by_pressure[node]
-    return slopes
+            sensitivity[node, :, column] += jump
+        sensitivity[node + 1] = jacobian[:, :nx] @ sensitivity[node]
+        sensitivity[node + 1] += jacobian[:, nx, None] * by_pressure[node]
+    return sensitivity
 
 
 def _jacobians(run: Integrator, course: Course, states: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""All switch times at once: sequential linear programming with exact slopes in a trust region.
+"""All switch times at once: sequential linear programming with exact derivatives in a trust region.
 
 The motion depends on its switch times smoothly but, near sticking friction, with strong curvature; its
 memory is short (velocities and bends decay within a cycle) and only the pose adds up. So one shoot from the
@@ -16,7 +16,7 @@ from scipy.optimize import linprog
 
 from srs_opt.manoeuvre.order import OrderRows, standing_s
 from srs_opt.manoeuvre.rows import RowMaker, Rows
-from srs_opt.manoeuvre.shooting import STEP_S, Shot, shoot, shoot_with_slopes
+from srs_opt.manoeuvre.shooting import STEP_S, Shot, shoot, shoot_with_sensitivity
 from srs_opt.manoeuvre.task import Task
 from srs_opt.manoeuvre.valves import ValvePlan
 from srs_opt.simulate.integrate import Integrator
@@ -92,7 +92,7 @@ class Solver:
         steps = 0
         while steps < most and reach >= LEAST_REACH_S and idle < 4:
             steps += 1
-            shot = shoot_with_slopes(self.run, self.task.start.state, best.plan, self.step_s)
+            shot = shoot_with_sensitivity(self.run, self.task.start.state, best.plan, self.step_s)
             step = self._step(shot, reach)
             if step is None:
                 break
@@ -135,8 +135,8 @@ class Solver:
         radius = self._radius(shot)
         rows = self.rows(shot, radius)
         keep = rows.values < 1.5 * max(reach, 0.01) + 0.05
-        rows = Rows(rows.values[keep], None if rows.slopes is None else rows.slopes[keep])
-        assert rows.slopes is not None
+        rows = Rows(rows.values[keep], None if rows.jacobian is None else rows.jacobian[keep])
+        assert rows.jacobian is not None
         n, m = plan.switches, rows.values.size
         size = n + 2 + 1 + m  # times, duration, pressure; radius; violations
         cost = np.zeros(size)
@@ -144,7 +144,7 @@ class Solver:
         cost[n + 1] = 0.02 * plan.fills / 50.0 if task.objective == "air" else 0.0
         cost[n + 2] = SPACE_S_PER_M if task.objective == "space" else 0.0
         cost[n + 3 :] = PENALTY_PER_M
-        near = sparse.hstack([sparse.csr_matrix(-rows.slopes), -sparse.identity(m)])
+        near = sparse.hstack([sparse.csr_matrix(-rows.jacobian), -sparse.identity(m)])
         dwell, room = self._dwell_rows(plan, size)
         low, high = np.full(size, -np.inf), np.full(size, np.inf)
         low[:n], high[:n] = -reach, reach

@@ -34,8 +34,8 @@ class Space:
         away = points - nearest
         distance = np.hypot(*away.T)
         side = np.where(shapely.contains_properly(self.region, at), 1.0, -1.0)
-        slope = side[:, None] * away / np.maximum(distance, 1e-9)[:, None]
-        return side * distance, slope
+        jacobian = side[:, None] * away / np.maximum(distance, 1e-9)[:, None]
+        return side * distance, jacobian
 
 
 def load_space(path: str) -> Space:

@@ -9,6 +9,7 @@ import numpy as np
 from srs_opt.geometry import rotate
 from srs_opt.robot import Robot
 from srs_opt.simulate.integrate import Integrator
+from srs_opt.simulate.interpolate import linear
 from srs_opt.simulate.shapes import centre_lines
 
 SAMPLES = 96  # body shapes per cycle for the envelope: it errs by less than 0.1 mm, with half of them by 1 mm
@@ -29,8 +30,7 @@ def body_over_cycle(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return times (samples,), poses (samples, 3) and centre lines x, y (points, samples) in the room."""
     at = np.linspace(0.0, time_s[-1], samples)
-    poses = np.stack([np.interp(at, time_s, column) for column in pose.T], axis=1)
-    kappas = np.stack([np.interp(at, time_s, column) for column in kappa.T])
-    x, y = centre_lines(run, kappas.T).T
+    poses, kappas = linear(time_s, pose, at), linear(time_s, kappa, at)
+    x, y = centre_lines(run, kappas).T
     room_x, room_y = rotate(poses[:, 2], x, y)
     return at, poses, room_x + poses[:, 0], room_y + poses[:, 1]

@@ -99,8 +99,8 @@ def monodromy_step(structure: Structure) -> ca.Function:
     x, p = ca.SX.sym("x", step.size1_in(0)), ca.SX.sym("p", step.size1_in(3))
     valve, h, m = ca.SX.sym("valve", structure.segments), ca.SX.sym("h"), ca.SX.sym("m", 3, 3)
     x_next, error = step(x, valve, h, p)
-    slope = ca.jacobian(x_next[VELOCITY], x)[:, VELOCITY]
-    both = ca.vertcat(x_next, ca.vec(slope @ m))
+    jacobian = ca.jacobian(x_next[VELOCITY], x)[:, VELOCITY]
+    both = ca.vertcat(x_next, ca.vec(jacobian @ m))
     return ca.Function("monodromy", [ca.vertcat(x, ca.vec(m)), valve, h, p], [both, error], {"cse": True})
 
 
@@ -121,9 +121,9 @@ def tangent_kernel(structure: Structure) -> Kernel:
         x, valve, h, p = (ca.SX.sym(n, step.size1_in(i)) for i, n in enumerate(("x", "valve", "h", "p")))
         dx, dh, dp = ca.SX.sym("dx", x.numel()), ca.SX.sym("dh"), ca.SX.sym("dp", p.numel())
         following, error = step(x, valve, h, p)
-        slope = ca.jtimes(following, ca.vertcat(x, h, p), ca.vertcat(dx, dh, dp))
+        jacobian = ca.jtimes(following, ca.vertcat(x, h, p), ca.vertcat(dx, dh, dp))
         inputs = [ca.vertcat(x, dx), ca.vertcat(valve, dh), h, ca.vertcat(p, dp)]
-        return ca.Function("tangent", inputs, [ca.vertcat(following, slope), error], {"cse": True})
+        return ca.Function("tangent", inputs, [ca.vertcat(following, jacobian), error], {"cse": True})
 
     nx, np_ = state_layout(structure).size, build(structure)[0].vector.numel()
     return Kernel(f"tangent {structure}", (2 * nx, structure.segments + 1, 2 * np_), make)

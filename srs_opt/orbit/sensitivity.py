@@ -59,7 +59,7 @@ class Sensitivity:
             "frequency_hz": -self.period_s / wave.frequency_hz**2,
             "pressure_kpa": self.pressure_kpa,
             "phase_rad": np.array([-(on + off) / omega for on, off in edges]),
-            "offset": np.array([(off - on) * slope for (on, off), slope in zip(edges, opening)]),
+            "offset": np.array([(off - on) * jacobian for (on, off), jacobian in zip(edges, opening)]),
         }
 
 
@@ -100,7 +100,7 @@ def sensitivity(robot: Robot, orbit: Orbit, model: str | None = None) -> Sensiti
     for direction, own in zip(asked, direct):
         dz = closing @ own[-1, free]
         path = own + np.tensordot(dz, by_start, axes=1)
-        derivatives.append(_motion_slope(orbit, path[:, :3], direction.stretch))
+        derivatives.append(_motion_derivative(orbit, path[:, :3], direction.stretch))
     switches = iter(derivatives[count + 1 :])
     return Sensitivity(
         robot={n: d for n, d in zip(names, derivatives) if n not in GAIT_PARAMETERS},
@@ -150,7 +150,7 @@ def _follow(run: Integrator, orbit: Orbit, p: np.ndarray, directions: list[_Dire
     return tangents
 
 
-def _motion_slope(orbit: Orbit, path: np.ndarray, stretch: float) -> np.ndarray:
+def _motion_derivative(orbit: Orbit, path: np.ndarray, stretch: float) -> np.ndarray:
     """Return the change of (speed, turn rate) for a change `path` (n, 3) of the poses, by a complex step."""
     step = 1j * _TINY
     time = orbit.time_s * (1 + step * stretch)

@@ -27,7 +27,7 @@ from srs_opt.model.chambers import Chambers, Drive
 from srs_opt.model.compliant import CompliantModel
 from srs_opt.model.parameters import Structure
 from srs_opt.model.registry import build, state_layout
-from srs_opt.model.state import BODY_STATES, POSE, VELOCITY, WORK
+from srs_opt.model.state import BODY_STATES, HEADING, POSE, VELOCITY, WORK
 from srs_opt.simulate.tableau import COUPLING, GAMMA, LEVER_M, NODES, STAGES, TIME_WEIGHTS
 
 
@@ -68,7 +68,7 @@ def compliant_step(structure: Structure) -> ca.Function:
         bend = parameters["segment_length_m"] * (half.dkappa - end.dkappa)
         shape_error, end = ca.sumsqr(LEVER_M * bend), half
     moved, velocity, kappa, dkappa = to_body(y, dy, end.kappa, end.dkappa, p)
-    step = ca.vertcat(*turn_by(ca.cos(x[2]), ca.sin(x[2]), moved[0], moved[1]), moved[2])
+    step = ca.vertcat(*turn_by(ca.cos(x[HEADING]), ca.sin(x[HEADING]), moved[0], moved[1]), moved[2])
     pose = x[POSE] + step
     following = ca.vertcat(pose, velocity, x[WORK] + total[-1], kappa, dkappa, end.vector())
     assert following.shape[0] == layout.size >= BODY_STATES

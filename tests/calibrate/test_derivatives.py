@@ -28,11 +28,11 @@ def setting():
     base = base_coordinates(robot)
     sizes = tuple(c for k in all_candidates(robot.links) for c in k.sizes)
     values = {**start_point(base).values, "curvature_bias.bias": 0.5, "camera_scale.scale": 0.02}
-    slopes = experiment.predict("t", Point(values), (*base, *sizes), FINE_M_S).slopes
-    return experiment, values, (*base, *sizes), slopes
+    jacobian = experiment.predict("t", Point(values), (*base, *sizes), FINE_M_S).jacobian
+    return experiment, values, (*base, *sizes), jacobian
 
 
-# slopes are of order 2 in the step: a few per mille here, enough for Gauss-Newton to converge
+# derivatives are of order 2 in the step: a few per mille here, enough for Gauss-Newton to converge
 @pytest.mark.parametrize(
     "name",
     [
@@ -58,7 +58,7 @@ def setting():
     ],
 )
 def test_slopes_are_those_of_the_prediction(setting, name):
-    experiment, values, coordinates, slopes = setting
+    experiment, values, coordinates, jacobian = setting
     k = [c.name for c in coordinates].index(name)
     h = 2e-3 * coordinates[k].typical
     ends = [
@@ -66,14 +66,14 @@ def test_slopes_are_those_of_the_prediction(setting, name):
         for s in (1, -1)
     ]
     difference = (ends[0] - ends[1]) / (2 * h)
-    error = np.linalg.norm(slopes[:, :, k] - difference) / np.linalg.norm(difference)
+    error = np.linalg.norm(jacobian[:, :, k] - difference) / np.linalg.norm(difference)
     assert error < 0.06
 
 
 def test_a_dead_time_is_a_late_clock(setting):
-    experiment, values, coordinates, slopes = setting
+    experiment, values, coordinates, jacobian = setting
     names = [c.name for c in coordinates]
-    late, clock = (slopes[:, :, names.index(n)] for n in ("dead_time.delay_s", "clock_offset.offset_s"))
+    late, clock = (jacobian[:, :, names.index(n)] for n in ("dead_time.delay_s", "clock_offset.offset_s"))
     assert late == pytest.approx(-clock)
     plain = {
         k: v for k, v in values.items() if "bias" not in k
@@ -108,7 +108,7 @@ def test_slopes_of_the_same_place_serve_again_whoever_is_asked(setting, monkeypa
     assert work.answer(["t"], Request(there, wider.coordinates, stale=True))["t"].stale
 
 
-@pytest.mark.parametrize("where", ["points", "slopes"])
+@pytest.mark.parametrize("where", ["points", "derivatives"])
 def test_a_motion_without_finite_derivatives_is_no_place_for_a_fit(where, monkeypatch):
     robot = wpi_srs()
     base = base_coordinates(robot)

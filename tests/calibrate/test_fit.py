@@ -27,7 +27,7 @@ class Curved:
         self.t = np.linspace(0, 1, count)
         clean = self.values(TRUTH) + wrong * np.sin(9 * self.t)
         self.measured = clean + 0.01 * rng.standard_normal(count)
-        self.slopes = None
+        self.jacobian = None
 
     def values(self, x):
         return x[0] * np.exp(x[1] * (1 + 0.2 * self.t))
@@ -37,11 +37,11 @@ class Curved:
         if not stale:
             steps = 1e-6 * np.eye(2)
             ends = [(self.values(x + s) - self.values(x - s)) / 2e-6 for s in steps]
-            self.slopes = np.column_stack(ends)
+            self.jacobian = np.column_stack(ends)
         none = np.zeros(0)
         normal = trial_normal_equations(
             self.measured - self.values(x),
-            self.slopes,
+            self.jacobian,
             Whitening.of_white(0.01, self.measured),
             (),
             none,
@@ -72,16 +72,18 @@ def test_a_step_with_scatter_at_its_limits_is_that_of_a_general_solver(seed):
     trials, names = {}, ("one", "two", "three")
     rows, measured, sd = [], [], np.array([0.03])
     for k, name in enumerate(names):
-        slopes = rng.standard_normal((40, 2))
-        residual = slopes @ [0.5, -0.4] + (0.8, -0.9, 0.02)[k] * slopes[:, 0]  # more scatter than is allowed
+        jacobian = rng.standard_normal((40, 2))
+        residual = (
+            jacobian @ [0.5, -0.4] + (0.8, -0.9, 0.02)[k] * jacobian[:, 0]
+        )  # more scatter than is allowed
         residual += 0.1 * rng.standard_normal(40)
         now = np.array([0.05 * (k - 1)])
         trials[name] = trial_normal_equations(
-            residual, slopes, Whitening.of_white(0.1, residual), (0,), sd, now
+            residual, jacobian, Whitening.of_white(0.1, residual), (0,), sd, now
         )
         own = np.zeros((40, 3))
-        own[:, k] = slopes[:, 0]
-        rows.append(np.column_stack([slopes, own]) / 0.1)
+        own[:, k] = jacobian[:, 0]
+        rows.append(np.column_stack([jacobian, own]) / 0.1)
         measured.append(residual / 0.1)
     for k in range(3):  # the scatter's prior
         rows.append(np.eye(5)[2 + k : 3 + k] / sd)

@@ -28,7 +28,7 @@ def test_slopes_are_those_of_whole_solutions(offset, model):
     base = base_coordinates(robot)
     gait = Wave.uniform(robot.segments, 1.5, 48.0, math.pi / 2, offset).gait()
     moves = [parameter_moves(robot, {}, c, model) for c in base]
-    slopes = path(robot, steady_gait(robot, gait, model, tolerance=FINE), moves, model)[1]
+    jacobian = path(robot, steady_gait(robot, gait, model, tolerance=FINE), moves, model)[1]
     for k, coordinate in enumerate(base):
         ends = []
         for sign in (1, -1):
@@ -37,7 +37,7 @@ def test_slopes_are_those_of_whole_solutions(offset, model):
             orbit = steady_gait(moved, gait, model, tolerance=FINE)
             ends.append(np.array([orbit.speed_m_s, orbit.turn_rate_rad_s / orbit.speed_m_s]))
         difference = (ends[0] - ends[1]) / 2e-3
-        np.testing.assert_allclose(slopes[:, k], difference, rtol=5e-3, atol=5e-4)
+        np.testing.assert_allclose(jacobian[:, k], difference, rtol=5e-3, atol=5e-4)
 
 
 def test_maps_find_the_truth_and_say_how_much_less_they_know(tmp_path, capsys):
@@ -63,7 +63,7 @@ def test_slopes_of_a_robots_own_effects_are_those_of_whole_solutions():
     gait = Wave.uniform(robot.segments, 1.5, 48.0, math.pi / 2, 0.2).gait()
     coordinates = fitted_coordinates(robot)[-2:]
     moves = [parameter_moves(robot, {}, c, "complex") for c in coordinates]
-    slopes = path(robot, steady_gait(robot, gait, tolerance=FINE), moves, "complex")[1]
+    jacobian = path(robot, steady_gait(robot, gait, tolerance=FINE), moves, "complex")[1]
     for k, coordinate in enumerate(coordinates):
         ends = []
         for side in (1, -1):
@@ -71,7 +71,7 @@ def test_slopes_of_a_robots_own_effects_are_those_of_whole_solutions():
             orbit = steady_gait(moved, gait, tolerance=FINE)
             ends.append(np.array([orbit.speed_m_s, orbit.turn_rate_rad_s / orbit.speed_m_s]))
         difference = (ends[0] - ends[1]) / (0.02 * coordinate.typical)
-        np.testing.assert_allclose(slopes[:, k], difference, rtol=1e-2, atol=1e-3)
+        np.testing.assert_allclose(jacobian[:, k], difference, rtol=1e-2, atol=1e-3)
 
 
 def test_maps_refit_an_effect_of_the_robot_and_say_which_they_cannot_show(tmp_path, capsys):
@@ -79,8 +79,8 @@ def test_maps_refit_an_effect_of_the_robot_and_say_which_they_cannot_show(tmp_pa
     design = small_design(np.random.default_rng(4), 3.0)[:8]
     write_dataset(tmp_path / "maps", truth, design, 6, Recording(maps=True, tracks=False))
     robot = tmp_path / "maps" / "robot.yaml"
-    slope = {"name": "floor_slope", "angle": 0.001, "direction": 0.0, "sd": {"angle": 0.01}}
-    robot.write_text(yaml.safe_dump({**yaml.safe_load(robot.read_text()), "effects": [DRAG, slope]}))
+    tilt = {"name": "floor_slope", "angle": 0.001, "direction": 0.0, "sd": {"angle": 0.01}}
+    robot.write_text(yaml.safe_dump({**yaml.safe_load(robot.read_text()), "effects": [DRAG, tilt]}))
     assert main([str(tmp_path / "maps"), "--json", "--out", str(tmp_path / "out")]) == 0
     told = capsys.readouterr()
     answer = json.loads(told.out)

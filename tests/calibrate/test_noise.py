@@ -55,13 +55,13 @@ def test_whitening_is_what_the_covariance_says_whatever_frames_are_missing():
 def test_what_is_a_trials_own_is_integrated_out():
     noise, values = Noise(0.7, 0.4, 0.05), gappy()
     seen, rng = np.isfinite(values), np.random.default_rng(2)
-    slopes, own, own_sd = rng.random((values.size, 3)), rng.random((values.size, 2)), np.array([0.5, 2.0])
+    jacobian, own, own_sd = rng.random((values.size, 3)), rng.random((values.size, 2)), np.array([0.5, 2.0])
     whiten, none = Whitening(noise, TIME_S, seen), np.zeros(0)
-    normal = trial_normal_equations(values.ravel(), slopes, whiten, (), none, none, own, own_sd)
+    normal = trial_normal_equations(values.ravel(), jacobian, whiten, (), none, none, own, own_sd)
     rows = seen.ravel()
     part = own[rows] * own_sd
     weight = np.linalg.inv(covariance_of(noise, seen) + part @ part.T)
-    both = np.column_stack([slopes, values.ravel()])[rows]
+    both = np.column_stack([jacobian, values.ravel()])[rows]
     assert normal.raw == pytest.approx(both.T @ weight @ both, rel=1e-8)
     assert normal.count == rows.sum()
 

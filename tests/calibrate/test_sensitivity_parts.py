@@ -1,4 +1,4 @@
-"""The pieces behind the slopes: a second derivation, the small structure, the tolerance."""
+"""The pieces behind the derivatives: a second derivation, the small structure, the tolerance."""
 
 import numpy as np
 import pytest
@@ -88,14 +88,14 @@ def test_differences_are_the_tangents_of_the_integration(setting, effects):
 def test_slopes_of_a_calibration_are_exact(setting):
     experiment, trial, base, start = setting
     fine, h = 1e-7, 1e-4
-    slopes = experiment.work.predict(trial.name, start, base, fine).slopes
+    jacobian = experiment.work.predict(trial.name, start, base, fine).jacobian
     for k, coordinate in enumerate(base):
         ends = []
         for sign in (1, -1):
             moved = {**start.values, coordinate.name: start.values[coordinate.name] + sign * h}
             ends.append(experiment.work.predict(trial.name, Point(moved), (), fine).points)
         difference = (ends[0] - ends[1]) / (2 * h)
-        assert np.abs(slopes[:, :, k] - difference).max() < 1e-3 * np.abs(difference).max(), coordinate.name
+        assert np.abs(jacobian[:, :, k] - difference).max() < 1e-3 * np.abs(difference).max(), coordinate.name
 
 
 def test_more_data_ask_for_a_finer_simulation():

@@ -16,14 +16,14 @@ def one(seed, gap=0.0):
     total = 0
     truth = 0.2 * rng.standard_normal(3)
     for _ in range(10):
-        slopes = rng.standard_normal((60, 9))
+        jacobian = rng.standard_normal((60, 9))
         own = np.zeros(9)
         own[:3] = truth
         own[0] += scatter_sd[0] * rng.standard_normal()
         own[5] += gap
-        residual = slopes @ own + sd * rng.standard_normal(60)
+        residual = jacobian @ own + sd * rng.standard_normal(60)
         whiten = Whitening.of_white(sd, residual)
-        normal = trial_normal_equations(residual, slopes, whiten, (0,), scatter_sd, np.zeros(1))
+        normal = trial_normal_equations(residual, jacobian, whiten, (0,), scatter_sd, np.zeros(1))
         total = total + normal.eliminated().matrix
     score, covariance = project(total, range(3), range(3, 9), np.full(3, 25.0), np.zeros(3))
     return detect(score, covariance, GROUPS, np.zeros(10), np.random.default_rng(seed)).p_value

@@ -12,13 +12,14 @@ from srs_opt.calibrate.candidates import fitted_coordinates
 from srs_opt.calibrate.experiment import Experiment, Point
 from srs_opt.calibrate.fit import start_point
 from srs_opt.calibrate.forms import Form, form_of_entry, forms_of
-from srs_opt.calibrate.instruments import QUANTITIES, check_expectations
+from srs_opt.calibrate.instruments import check_expectations
 from srs_opt.calibrate.model import Conditions, Model
 from srs_opt.calibrate.run import calibrate
 from srs_opt.effects import all_effects, built_in, plugins
 from srs_opt.effects.effect import HOOKS
 from srs_opt.effects.parameter import Component
 from srs_opt.measurement.dataset import load_dataset
+from srs_opt.measurement.instruments import INSTRUMENTS
 from srs_opt.measurement.records import Trial
 from srs_opt.model.parameters import Structure
 from srs_opt.model.registry import build
@@ -57,7 +58,7 @@ def entry_of(name, share=1.0):
 def test_it_says_what_it_is_and_what_to_look_at(name):
     effect = all_effects()[name]
     assert effect.what and effect.look and effect.hooks <= set(HOOKS)
-    assert effect.instrument is None or effect.instrument in QUANTITIES
+    assert effect.instrument is None or effect.instrument in INSTRUMENTS.all()
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -114,13 +115,13 @@ def test_slopes_of_the_picture_are_those_of_differences(track, name):
     fine = 2e-8
     start = start_point(fitted_coordinates(wpi_srs())).values
     form = forms_of(all_effects()[name], 5)[-1]
-    slopes = track.predict("t", Point(start), form.sizes, fine).slopes
+    jacobian = track.predict("t", Point(start), form.sizes, fine).jacobian
     for k, c in enumerate(form.sizes):
         h = 2e-3 * c.typical
         signs = (1, -1) if c.lower < 0 else (1, 0)
         ends = [track.predict("t", Point({**start, c.name: s * h}), (), fine).points for s in signs]
         difference = (ends[0] - ends[1]) / ((signs[0] - signs[1]) * h)
-        assert np.linalg.norm(slopes[:, :, k] - difference) < 0.06 * np.linalg.norm(difference)
+        assert np.linalg.norm(jacobian[:, :, k] - difference) < 0.06 * np.linalg.norm(difference)
 
 
 @pytest.mark.parametrize("name", DISSIPATING)

@@ -1,4 +1,4 @@
-"""Manoeuvres: exact slopes, certified answers that replay, room kept, ticks and dwell."""
+"""Manoeuvres: exact derivatives, certified answers that replay, room kept, ticks and dwell."""
 
 import csv
 import json
@@ -9,7 +9,7 @@ import pytest
 
 from srs_opt.gait import published_wave
 from srs_opt.manoeuvre.__main__ import main
-from srs_opt.manoeuvre.shooting import shoot, shoot_with_slopes
+from srs_opt.manoeuvre.shooting import shoot, shoot_with_sensitivity
 from srs_opt.manoeuvre.space import load_space
 from srs_opt.manoeuvre.starts import playable
 from srs_opt.manoeuvre.task import End, Start, Task
@@ -32,7 +32,7 @@ def answer(arguments, out, capsys):
 def test_slopes_are_those_of_differences():
     run = integrator(ROBOT)
     plan = ValvePlan.of_gaits((published_wave(ROBOT, 2.0, 50.0, 0.3).gait().later(0.013),), 0.83)
-    shot = shoot_with_slopes(run, run.rest(), plan, 2e-4)
+    shot = shoot_with_sensitivity(run, run.rest(), plan, 2e-4)
     times = np.append(plan.times(), [plan.duration_s, plan.pressure_kpa])
     for k in (0, times.size // 2, times.size - 2, times.size - 1):
         hair = np.zeros(times.size)
@@ -41,7 +41,7 @@ def test_slopes_are_those_of_differences():
         # small steps: the differences then are those of the motion, not of a mesh that moves along
         one, other = shoot(run, run.rest(), moved, 2e-4)
         wanted = (one.states[-1] - other.states[-1]) / 2e-5
-        found = shot.slopes[-1, :, k]
+        found = shot.sensitivity[-1, :, k]
         assert np.abs(found - wanted)[:6].max() < 0.05 * np.abs(wanted[:6]).max() + 1e-3
 
 
@@ -76,9 +76,11 @@ def test_the_body_keeps_to_its_corridor(tmp_path, capsys):
 
 def test_depth_in_a_space(tmp_path):
     (tmp_path / "l.yaml").write_text("polygon: [[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]]\n")
-    depth, slope = load_space(str(tmp_path / "l.yaml")).depth(np.array([[1.5, 0.8], [1.5, 1.3], [0.1, 1.5]]))
+    depth, jacobian = load_space(str(tmp_path / "l.yaml")).depth(
+        np.array([[1.5, 0.8], [1.5, 1.3], [0.1, 1.5]])
+    )
     assert depth == pytest.approx([0.2, -0.3, 0.1])
-    assert slope == pytest.approx(np.array([[0, -1], [0, -1], [1, 0]]))
+    assert jacobian == pytest.approx(np.array([[0, -1], [0, -1], [1, 0]]))
     (tmp_path / "bow.yaml").write_text("polygon: [[0, 0], [1, 1], [1, 0], [0, 1]]\n")
     with pytest.raises(Exception, match="crosses itself"):
         load_space(str(tmp_path / "bow.yaml"))

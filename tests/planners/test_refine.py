@@ -1,4 +1,4 @@
-"""Plans refined: slopes against differences, faster and certified afresh, playable by valves and firmware."""
+"""Plans refined: Jacobian against differences, faster, certified afresh, playable by valves and firmware."""
 
 import dataclasses
 import json
@@ -20,7 +20,7 @@ from planners.plan.__main__ import main
 from planners.plan.program import plan_program
 from planners.plan.solve import solve_with_lattice
 from planners.refine.refine import check_refinable, refine
-from planners.refine.shots import shoot_windows, with_slopes
+from planners.refine.shots import shoot_windows, with_sensitivity
 from planners.refine.window import Window
 from planners.search.problem import Problem
 from planners.search.tree import at_rest
@@ -58,14 +58,14 @@ def test_slopes_are_those_of_finer_simulations(planned):
     joints = [problem.joints.joint(a, b) for a, b in pairwise(numbers[:4])]
     window = Window.of_cycles(joints, problem.joints.limits)
     (shot,) = shoot_windows(problem.integrator, start, [window])
-    slopes = with_slopes(problem.integrator, start, shot).slopes[-1][:3]
+    jacobian = with_sensitivity(problem.integrator, start, shot).jacobian[-1][:3]
     x = window.unknowns()
     for column in range(1, window.size, 4):
         by = 1e-4 if column < window.size - window.cycles else 0.05
         moved = [window.moved(x + sign * by * np.eye(window.size)[column]) for sign in (1, -1)]
         a, b = (problem.integrator.integrate(w.timeline(), start, 1e-7).final[:3] for w in moved)
         exact = (a - b) / (2 * by)
-        assert np.abs(slopes[:, column] - exact).max() < 0.05 * np.abs(exact).max() + 2e-3
+        assert np.abs(jacobian[:, column] - exact).max() < 0.05 * np.abs(exact).max() + 2e-3
 
 
 def test_a_plan_becomes_faster_and_is_certified_afresh(planned, refined):

@@ -36,7 +36,9 @@ from srs_opt.model.parameters import Structure
 from srs_opt.model.registry import build
 from srs_opt.simulate.compiled import FLAGS, compiled
 
-BODY = 6  # u_x, u_y, yaw momentum, heading, ahead, aside
+# the body's states at a point: velocity, then the pose in the frame that goes along the mean path
+U_X, U_Y, YAW_MOMENTUM, HEADING, AHEAD, ASIDE = range(6)
+VELOCITY, BODY = slice(0, 3), 6
 BODY_NAMES = (
     "forward velocity",
     "sideways velocity",
@@ -206,8 +208,8 @@ def _shape(
     return state.kappa, state.dkappa, full.dkappa, rates
 
 
-def _lateral_reach(m: Mechanics, heading: ca.SX, ahead: ca.SX, aside: ca.SX, bend: ca.SX) -> ca.SX:
-    """Return how far links and arc middles lie left of the mean path (curvature `bend`), (2 N - 1, 1) m."""
+def _lateral_reach(m: Mechanics, heading: ca.SX, ahead: ca.SX, aside: ca.SX, curvature: ca.SX) -> ca.SX:
+    """Return how far links and arc middles lie left of the mean path of that curvature, (2 N - 1, 1) m."""
     chain, length = m.chain, m.length
     xs, ys = [chain.x], [chain.y]
     for i in range(m.links - 1):
@@ -220,8 +222,8 @@ def _lateral_reach(m: Mechanics, heading: ca.SX, ahead: ca.SX, aside: ca.SX, ben
     dx, dy = turn_by(ca.cos(heading), ca.sin(heading), x, y)
     room_x, room_y = ahead + dx, aside + dy
     # distance to the centre of rotation minus the radius, in a form that is regular for a straight path
-    distance = ca.sqrt((bend * room_x) ** 2 + (1 - bend * room_y) ** 2)
-    return (2 * room_y - bend * (room_x**2 + room_y**2)) / (1 + distance)
+    distance = ca.sqrt((curvature * room_x) ** 2 + (1 - curvature * room_y) ** 2)
+    return (2 * room_y - curvature * (room_x**2 + room_y**2)) / (1 + distance)
 
 
 def _filled(kind: PointKind, s: _Symbols, p: ca.SX, expression: ca.SX) -> ca.SX:
@@ -235,11 +237,11 @@ def _filled(kind: PointKind, s: _Symbols, p: ca.SX, expression: ca.SX) -> ca.SX:
 def _equations(kind: PointKind, s: _Symbols, p: ca.SX, closed: ca.SX) -> ca.SX:
     _, m, actuator = build(kind.structure)
     x = s.scale * s.x
-    velocity, heading, ahead, aside = x[:3], x[3], x[4], x[5]
+    velocity, heading, ahead, aside = x[VELOCITY], x[HEADING], x[AHEAD], x[ASIDE]
     free, free_rate, free_acceleration, deviation_rate = _shape(kind, actuator, s, closed, x[kind.moving :])
     body_rate, power = m.velocity_rate(ca.SX.zeros(3, 1), velocity)
-    yaw_rate = m.yaw_rate(velocity[2])
-    c, sn = ca.cos(heading), ca.sin(heading)
+    yaw_rate = m.yaw_rate(x[YAW_MOMENTUM])
+    v_x, v_y = turn_by(ca.cos(heading), ca.sin(heading), x[U_X], x[U_Y])
     given = [(m.dkappa, free_rate), (m.kappa, free)]
     bend_rates = ca.SX(0, 1)
     if isinstance(m, CompliantModel):
@@ -250,13 +252,13 @@ def _equations(kind: PointKind, s: _Symbols, p: ca.SX, closed: ca.SX) -> ca.SX:
     rates = ca.vertcat(
         body_rate,
         yaw_rate - s.turn_rate,
-        c * x[0] - sn * x[1] - s.speed + s.turn_rate * aside,
-        sn * x[0] + c * x[1] - s.turn_rate * ahead,
+        v_x - s.speed + s.turn_rate * aside,
+        v_y - s.turn_rate * ahead,
         bend_rates,
         deviation_rate,
     )
     duration = s.width / s.frequency
-    quadratures = ca.vertcat(s.width * s.x[4], s.width * s.x[5], duration * power)
+    quadratures = ca.vertcat(s.width * s.x[AHEAD], s.width * s.x[ASIDE], duration * power)
     paths = []
     if kind.envelope:
         paths.append(_lateral_reach(m, heading, ahead, aside, s.turn_rate / s.speed))
@@ -279,14 +281,14 @@ def _sources() -> str:
 
 @dataclass(frozen=True)
 class PointFunctions:
-    """Compiled ``value(y, scale, p, half_width, turns)``, ``slope(...)`` (its Jacobian) and
-    ``bend(y, scale, p, half_width, turns, multipliers)`` (the Hessian's lower triangle), with sparsities."""
+    """Compiled ``value(y, scale, p, half_width, turns)``, ``jacobian(...)`` and
+    ``hessian(y, scale, p, half_width, turns, multipliers)`` (its lower triangle), with sparsities."""
 
     value: ca.Function
-    slope: ca.Function
-    bend: ca.Function
-    slope_sparsity: ca.Sparsity
-    bend_sparsity: ca.Sparsity
+    jacobian: ca.Function
+    hessian: ca.Function
+    jacobian_sparsity: ca.Sparsity
+    hessian_sparsity: ca.Sparsity
 
 
 @lru_cache(maxsize=32)
@@ -309,7 +311,7 @@ def point_functions(kind: PointKind) -> PointFunctions:
             return function(out)
         # each curvature depends on few of the unknowns: the chain rule halves the operations
         inner = ca.jacobian(curvature, y)
-        if what == "slope":
+        if what == "jacobian":
             return function(ca.jacobian(out, y) + ca.jacobian(out, closed) @ inner)
         multipliers = ca.SX.sym("multipliers", out.numel())
         merit = ca.dot(multipliers, out)
@@ -322,15 +324,15 @@ def point_functions(kind: PointKind) -> PointFunctions:
             ca.tril(both[:n, :n] + mixed + mixed.T + inner.T @ both[n:, n:] @ inner + curved), multipliers
         )
 
-    value, slope, bend = (
+    value, jacobian, hessian = (
         compiled(
             f"gait_opt {what} {kind} {_sources()}",
             partial(make, what),
             FLAGS if what == "value" else LIGHT,
         )
-        for what in ("value", "slope", "bend")
+        for what in ("value", "jacobian", "hessian")
     )
-    return PointFunctions(value, slope, bend, slope.sparsity_out(0), bend.sparsity_out(0))
+    return PointFunctions(value, jacobian, hessian, jacobian.sparsity_out(0), hessian.sparsity_out(0))
 
 
 @lru_cache(maxsize=32)

@@ -79,9 +79,9 @@ class Program:
             "outputs_t": to_dm(outputs.T),
             "fixed": to_dm(fixed),
             "jacobian": jacobian_gather(
-                functions.slope_sparsity, points, inputs, outputs, sparse.coo_matrix(fixed)
+                functions.jacobian_sparsity, points, inputs, outputs, sparse.coo_matrix(fixed)
             ),
-            "hessian": hessian_gather(functions.bend_sparsity, points, inputs),
+            "hessian": hessian_gather(functions.hessian_sparsity, points, inputs),
             "rows": outputs.shape[0],
         }
 
@@ -149,12 +149,12 @@ class Program:
 
         value = ca.vec(mapped(functions.value)(y, scale, p, half_width, turns))
         g = part["outputs"] @ value + part["fixed"] @ z
-        slope = mapped(functions.slope)(y, scale, p, half_width, turns)
+        dense = mapped(functions.jacobian)(y, scale, p, half_width, turns)
         jacobian: Gather = part["jacobian"]
         multipliers = ca.reshape(part["outputs_t"] @ lam, kind.outputs, points)
-        bend = mapped(functions.bend)(y, scale, p, half_width, turns, multipliers)
+        curved = mapped(functions.hessian)(y, scale, p, half_width, turns, multipliers)
         hessian: Gather = part["hessian"]
-        return g, jacobian(_nonzeros(slope)), hessian(_nonzeros(bend))
+        return g, jacobian(_nonzeros(dense)), hessian(_nonzeros(curved))
 
     def _goal_derivatives(
         self, head: ca.MX, numbers: ca.MX, robots: ca.MX, lam: ca.MX
@@ -162,7 +162,7 @@ class Program:
         h, n, m = ca.SX.sym("h", self.head.size), ca.SX.sym("n", numbers.numel()), ca.SX.sym("m", lam.numel())
         p = ca.SX.sym("p", robots.numel())
         rows = self.goal.function(h, n, p)
-        first = ca.Function("goal_slope", [h, n, p], [rows, ca.jacobian(rows, h)])
+        first = ca.Function("goal_jacobian", [h, n, p], [rows, ca.jacobian(rows, h)])
         second = ca.Function("goal_bend", [h, n, p, m], [ca.hessian(ca.dot(m, rows), h)[0]])
         g, jac = first(head, numbers, robots)
         return g, jac, second(head, numbers, robots, lam)

@@ -107,9 +107,9 @@ def nlp_solver(
             "fatrop": {**_FATROP, **known, **own},
         }  # fmt: skip
     else:
-        slopes = _by_name(nlp, derivatives)["nlp_jac_fg"]
+        jacobians = _by_name(nlp, derivatives)["nlp_jac_fg"]
         hessian = _full_hessian(nlp, derivatives)
-        options |= {"no_nlp_grad": True, "hess_lag": hessian, "jac_fg": slopes, **_SQP, **own}
+        options |= {"no_nlp_grad": True, "hess_lag": hessian, "jac_fg": jacobians, **_SQP, **own}
     try:
         return ca.nlpsol("gait", solver.name, nlp, options)
     except RuntimeError as error:
@@ -138,7 +138,7 @@ def _by_name(nlp: dict[str, ca.MX], derivatives: dict[str, ca.Function]) -> dict
     x, p, lam_f, lam_g = _symbols(nlp)
     f, gradient = derivatives["grad_f"](x, p)
     g, jacobian = derivatives["jac_g"](x, p)
-    slope = gradient * lam_f + jacobian.T @ lam_g
+    of_lagrangian = gradient * lam_f + jacobian.T @ lam_g
     both, two = ["x", "p", "lam:f", "lam:g"], ["x", "p"]
     hessian = _full_hessian(nlp, derivatives)(x, p, lam_f, lam_g)
     all_in = [x, p, lam_f, lam_g]
@@ -149,11 +149,11 @@ def _by_name(nlp: dict[str, ca.MX], derivatives: dict[str, ca.Function]) -> dict
             "nlp_jac_fg", [x, p], [f, gradient, g, jacobian], two, ["f", "grad:f:x", "g", "jac:g:x"]
         ),
         "nlp_hess_l": ca.Function(
-            "nlp_hess_l", all_in, [slope, hessian], both, ["grad:gamma:x", "hess:gamma:x:x"]
+            "nlp_hess_l", all_in, [of_lagrangian, hessian], both, ["grad:gamma:x", "hess:gamma:x:x"]
         ),
         # multipliers of the parameters are not asked for
         "nlp_grad": ca.Function(
-            "nlp_grad", all_in, [f, g, slope, ca.DM.zeros(p.numel())], both,
+            "nlp_grad", all_in, [f, g, of_lagrangian, ca.DM.zeros(p.numel())], both,
             ["f", "g", "grad:gamma:x", "grad:gamma:p"],
         ),
     }  # fmt: skip
