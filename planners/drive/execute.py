@@ -15,32 +15,20 @@ from planners.drive.friction_ensemble import FrictionEnsemble
 from planners.drive.halt import halt
 from planners.drive.plant import Plant, PlantStopped, SimulatedPlant
 from planners.drive.reference import reference_of
+from planners.drive.settings import DEFAULT_DRIVE, DriveSettings
 from planners.plan.answer import Plan
 from planners.plan.solve import solve_with_lattice
 from planners.search.problem import ROUNDING_M, Problem
 from planners.search.track import Choice, Learned, Where, by_plan, choose, nearest_node
 from planners.search.tree import Root, arrival_index
 from srs_opt.errors import InputError, NoAnswerError
-from srs_opt.geometry import relative
+from srs_opt.geometry import relative, wrapped
 from srs_opt.model.parameters import valve_delay_s
 from srs_opt.model.state import FORWARD, POSE, POSE_AND_SPEED
 from srs_opt.robot import Robot
 from srs_opt.simulate.timeline import Timeline
 
 Array = NDArray[np.float64]
-# Lengths in body lengths, speeds in body lengths per second.
-ASTRAY = 0.254  # farther from the plan than this: plan anew
-STOP_CLEARANCE = -0.0169  # a cycle that should by table run deeper into a wall than this is not begun
-LEAST_ROOM = 0.00424  # foreseen, below which a halt is the better choice
-ON_TRACK = (0.0169, 0.0169, 0.03, 0.169)  # off the plan's place (x, y), heading (rad), speed: it is played on
-MOST_TRIED = 8  # gaits, before a cycle is given up
-MOST_IDLE = 4  # cycles without progress along the plan
-MOST_REPLANS = 8
-MOST_HALTS = 3  # from which the robot sets off again
-REPLAN_CYCLES = 4000  # looked at when planning anew in motion
-REST_CYCLES = 40_000  # and from rest, where there is time
-REPLAN_S, REST_S = 20.0, 60.0
-PATIENCE = 3.0  # times the plan's cycles
 
 
 @dataclass(frozen=True)
@@ -100,6 +88,7 @@ def execute(
     plan: Plan,
     true_robot: Robot | None = None,
     tell: Callable[[str], None] = lambda message: None,
+    settings: DriveSettings = DEFAULT_DRIVE,
 ) -> Execution:
     """Drive `plan` on the dynamic model of `true_robot` (default: the planned robot).
 
@@ -113,14 +102,21 @@ def execute(
         raise InputError(
             f"--true-robot '{robot.name}' has {robot.links} links, the plan is for {problem.robot.links}"
         )
-    return Drive(problem, plan, SimulatedPlant(problem, robot), tell).go()
+    return Drive(problem, plan, SimulatedPlant(problem, robot), tell, settings).go()
 
 
 class Drive:
     """One drive: the robot's state, the plan being followed, what was learned."""
 
-    def __init__(self, problem: Problem, plan: Plan, plant: Plant, tell: Callable[[str], None]) -> None:
-        self.problem, self.plant, self.tell = problem, plant, tell
+    def __init__(
+        self,
+        problem: Problem,
+        plan: Plan,
+        plant: Plant,
+        tell: Callable[[str], None],
+        settings: DriveSettings = DEFAULT_DRIVE,
+    ) -> None:
+        self.problem, self.plant, self.tell, self.settings = problem, plant, tell, settings
         self.watch = BodyWatch(problem, plant.robot, plant.run)
         self.ensemble = FrictionEnsemble(problem)
         self.delay_s = valve_delay_s(plant.robot)
@@ -132,10 +128,10 @@ class Drive:
         self.starts_s: list[float] = []
         self.halted: list[tuple[float, Timeline]] = []
         self._follow(plan)
-        self.most_cycles = 20 + math.ceil(PATIENCE * len(plan.gaits))
+        self.most_cycles = 20 + math.ceil(self.settings.patience * len(plan.gaits))
 
     def _follow(self, plan: Plan) -> None:
-        self.plan, self.reference = plan, reference_of(self.problem, plan)
+        self.plan, self.reference = plan, reference_of(self.problem, plan, self.settings)
         self.ends = np.array(
             [self.state[POSE_AND_SPEED], *(state[POSE_AND_SPEED] for state in plan.certificate.states)]
         )
@@ -164,7 +160,7 @@ class Drive:
         gait = self._next_gait()
         if gait is None:
             reason = "no gait keeps the body off the walls and no other way was found"
-            if self.halts == MOST_HALTS or not self._halt():
+            if self.halts == self.settings.most_halts or not self._halt():
                 return self._stop(reason)
             if self._at_goal():
                 return None
@@ -180,7 +176,7 @@ class Drive:
         self.state, self.before = self.plant.state, self.problem.motion.rest
         self.halts += 1
         self.tell(f"cycle {len(self.played)}: {stopped.reason}")
-        if not stopped.may_go_on or self.halts > MOST_HALTS:
+        if not stopped.may_go_on or self.halts > self.settings.most_halts:
             return False
         return self._at_goal() or self._plan_anew()
 
@@ -189,10 +185,10 @@ class Drive:
 
     def _next_gait(self) -> int | None:
         choice = self._choice()
-        lost = choice.astray_m > ASTRAY * self.problem.robot.length_m or self.idle >= MOST_IDLE
-        if (
-            lost or choice.clearance_m < STOP_CLEARANCE * self.problem.robot.length_m
-        ) and self.replans < MOST_REPLANS:
+        settings, length = self.settings, self.problem.robot.length_m
+        lost = choice.astray_m > settings.astray * length or self.idle >= settings.most_idle
+        blocked = choice.clearance_m < settings.stop_clearance * length
+        if (lost or blocked) and self.replans < settings.most_replans:
             self.replans += 1
             why = "strayed or stuck" if lost else "nothing fits"
             self.tell(f"cycle {len(self.played)}: {why}, replanning")
@@ -200,7 +196,7 @@ class Drive:
                 return None  # it cannot be planned in motion: halt first
             if self._plan_anew():
                 choice = self._choice()
-        if choice.clearance_m < STOP_CLEARANCE * self.problem.robot.length_m:
+        if choice.clearance_m < self.settings.stop_clearance * self.problem.robot.length_m:
             return None
         self.predicted = choice.displacement
         return choice.gait
@@ -220,12 +216,14 @@ class Drive:
                 return self._own_cycle(planned)
             return by_plan(self.problem, where, self.learned, planned)
         tried: list[Choice] = []
-        second, most_m = None, LEAST_ROOM * self.problem.robot.length_m
-        while len(tried) < MOST_TRIED:
+        second, most_m = None, self.settings.least_room * self.problem.robot.length_m
+        while len(tried) < self.settings.most_tried:
             barred = [choice.gait for choice in tried]
-            choice = choose(self.problem, self.reference, where, self.learned, self.node, barred)
+            choice = choose(
+                self.problem, self.reference, where, self.learned, self.node, barred, self.settings.track
+            )
             tried.append(choice)
-            if choice.clearance_m < STOP_CLEARANCE * self.problem.robot.length_m:
+            if choice.clearance_m < self.settings.stop_clearance * self.problem.robot.length_m:
                 break
             room_m = self._room_m(self.state, choice.gait)
             if room_m > enough_m:
@@ -250,9 +248,9 @@ class Drive:
     def _gait_by_plan(self, state: Array) -> int | None:
         """Return the gait that the plan plays next, if the robot is as the plan has it after a cycle."""
         off = np.abs(state[POSE_AND_SPEED] - self.ends[:-1])
-        off[:, 2] = np.abs((off[:, 2] + math.pi) % (2 * math.pi) - math.pi)
+        off[:, 2] = np.abs(wrapped(off[:, 2]))
         length = self.problem.robot.length_m
-        off = (off / (np.array(ON_TRACK) * (length, length, 1.0, length))).max(axis=1)
+        off = (off / (np.array(self.settings.on_track) * (length, length, 1.0, length))).max(axis=1)
         off[self.gaits_before[:-1] != self.before] = math.inf
         cycle = int(off.argmin())
         return self.plan.gaits[cycle] if off[cycle] < 1 else None
@@ -267,8 +265,8 @@ class Drive:
             result = solve_with_lattice(
                 relaxed,
                 root=Root(self.state, self.before, slack),
-                time_limit_s=REST_S if at_rest else REPLAN_S,
-                max_nodes=REST_CYCLES if at_rest else REPLAN_CYCLES,
+                time_limit_s=self.settings.rest_s if at_rest else self.settings.replan_s,
+                max_nodes=self.settings.rest_cycles if at_rest else self.settings.replan_cycles,
             )
         except NoAnswerError:
             return False
@@ -302,8 +300,9 @@ class Drive:
             period_s,
             self.problem.motion.row(index),
             self.problem.robot.length_m,
+            self.settings.track,
         )
-        node = nearest_node(self.reference, self.state[POSE], self.node)
+        node = nearest_node(self.reference, self.state[POSE], self.node, self.settings.track)
         self.idle = 0 if node > self.node else self.idle + 1
         self.node = node
         return None

@@ -6,17 +6,14 @@ import math
 
 import numpy as np
 
+from planners.drive.settings import DEFAULT_DRIVE, DriveSettings
 from planners.plan.answer import Plan
 from planners.search.problem import Problem
-from planners.search.track import NODES_PER_CYCLE, Reference
+from planners.search.track import Reference
 from srs_opt.simulate.interpolate import linear
 
-# In body lengths, and body lengths per second.
-BEYOND = 0.508  # past the goal
-SLOWEST = 0.424  # with which the time for that is reckoned
 
-
-def reference_of(problem: Problem, plan: Plan) -> Reference:
+def reference_of(problem: Problem, plan: Plan, settings: DriveSettings = DEFAULT_DRIVE) -> Reference:
     """Return the plan's nodes; the course is the direction of travel, free of the gait's swing."""
     c = plan.certificate
     periods = problem.motion.periods(plan.gaits)
@@ -30,7 +27,7 @@ def reference_of(problem: Problem, plan: Plan) -> Reference:
     heading = np.interp(ends, c.time_s, c.pose[:, 2])
     course = heading + problem.motion.course[gaits]
     course[-1] = course[-2] if c.time_s[-1] < ends[-1] - 1e-6 else course[-1]
-    count = max(2, NODES_PER_CYCLE * len(plan.gaits))
+    count = max(2, settings.track.nodes_per_cycle * len(plan.gaits))
     times = np.linspace(0.0, c.time_s[-1], count)
     x, y = linear(c.time_s, c.pose[:, :2], times).T
     speed = np.append(np.hypot(np.diff(x), np.diff(y)) / np.diff(times), np.nan)
@@ -40,18 +37,18 @@ def reference_of(problem: Problem, plan: Plan) -> Reference:
     speed = np.where(backwards[cycle], -speed, speed)
     pose = np.stack([x, y, np.interp(times, ends, course)], axis=1)
     reference = Reference(pose, speed, c.time_s[-1] - times, np.array(played)[cycle])
-    return _beyond(reference, problem.robot.length_m)
+    return _beyond(reference, problem.robot.length_m, settings)
 
 
-def _beyond(reference: Reference, length_m: float) -> Reference:
+def _beyond(reference: Reference, length_m: float, settings: DriveSettings) -> Reference:
     """Return the reference drawn out straight past its end, so that the goal is driven through."""
     x, y, course = reference.pose[-1]
     speed = float(reference.speed_m_s[-1])
-    far = math.copysign(1.0, speed) * np.linspace(0.0, BEYOND * length_m, 6)[1:]
+    far = math.copysign(1.0, speed) * np.linspace(0.0, settings.beyond * length_m, 6)[1:]
     line = np.stack(
         [x + far * math.cos(course), y + far * math.sin(course), np.full(far.size, course)], axis=1
     )
-    later = -np.abs(far) / max(abs(speed), SLOWEST * length_m)
+    later = -np.abs(far) / max(abs(speed), settings.slowest * length_m)
     return Reference(
         np.concatenate([reference.pose, line]),
         np.append(reference.speed_m_s, np.full(far.size, speed)),

@@ -20,17 +20,58 @@ from planners.search.tree import arrival_index
 from srs_opt.geometry import compose, points_in_room, rotate, wrapped
 
 Array = NDArray[np.float64]
-# Lengths in body lengths, speeds in body lengths per second.
-PLACE, COURSE_RAD, SPEED = 0.0847, 0.15, 2.54  # deviations that cost one unit each
-UNIT_S = 0.1  # time that costs one unit: a robot slower than its plan must not creep along it
-AIR, AIR_UNITS = 0.0636, 4.0  # below this clearance it costs, up to so many units at contact
-CONTACT, CONTACT_UNITS = 0.00212, 100.0
-CHANGE_UNITS = 0.05
-HORIZON, BEAM = 3, 5
-NODES_PER_CYCLE = 6
-LEARNING = 0.3
-LEAST_WAY = 0.0212  # body lengths; a cycle that should go less far teaches nothing
 _THIN = 3  # every third sample of a cycle is looked at
+
+
+@dataclass(frozen=True)
+class TrackSettings:
+    """What a gait is chosen by. Lengths in body lengths, speeds in body lengths per second.
+
+    What half and double of a value do is said as it is to be expected; only the values were driven.
+
+    Attributes
+    ----------
+    place, course_rad, speed : float
+        Deviations from the plan that cost one unit each. Their ratios weigh place against course; half of all
+        three follows the plan more closely and pays in time, double cuts its corners.
+    unit_s : float
+        Time that costs one unit: a robot slower than its plan must not creep along it.
+    air, air_units : float
+        Below this clearance it costs, up to so many units at contact. Half: bodies pass nearer to walls;
+        double: the robot leaves a plan that is itself nearer to walls.
+    contact, contact_units : float
+        A clearance below this counts as contact, which costs more than any deviation.
+    change_units : float
+        Cost of another gait than the one before: without, two gaits that are as good alternate.
+    horizon, beam : int
+        Cycles rolled out, and branches kept at each: the time for a choice grows with both. Fewer cycles miss
+        turns that only pay two cycles later.
+    nodes_per_cycle : int
+        Nodes of the reference per cycle of the plan: the nearest one is found to within a sixth of a cycle.
+    learning : float
+        Weight of the last cycle in what is learned. Half follows a change of ground in twice the cycles,
+        double follows the noise of single ones.
+    least_way : float
+        A cycle that should go less far teaches nothing about the stretch.
+    """
+
+    place: float = 0.0847
+    course_rad: float = 0.15
+    speed: float = 2.54
+    unit_s: float = 0.1
+    air: float = 0.0636
+    air_units: float = 4.0
+    contact: float = 0.00212
+    contact_units: float = 100.0
+    change_units: float = 0.05
+    horizon: int = 3
+    beam: int = 5
+    nodes_per_cycle: int = 6
+    learning: float = 0.3
+    least_way: float = 0.0212
+
+
+DEFAULT_TRACK = TrackSettings()
 
 
 class Reference(NamedTuple):
@@ -73,17 +114,23 @@ class Learned:
         return np.stack([x, y, local[..., 2] + turned], axis=-1)
 
     def update(
-        self, predicted: Array, observed: Array, period_s: float, gait: int, length_m: float
+        self,
+        predicted: Array,
+        observed: Array,
+        period_s: float,
+        gait: int,
+        length_m: float,
+        settings: TrackSettings = DEFAULT_TRACK,
     ) -> Learned:
         """Learn from one cycle's predicted (corrected) and observed displacement, (3,) each."""
         far = math.hypot(predicted[0], predicted[1])
         stretch, own = self.stretch, dict(self.own)
-        if far > LEAST_WAY * length_m:
+        if far > settings.least_way * length_m:
             along = min(max(float(observed[:2] @ predicted[:2]) / far**2, 0.2), 1.5)
-            stretch = min(max(stretch * (1 + LEARNING * (along - 1)), 0.5), 1.5)
+            stretch = min(max(stretch * (1 + settings.learning * (along - 1)), 0.5), 1.5)
             alone = own.get(gait, 1.0) * along * self.stretch / stretch
             own[gait] = min(max(alone, 0.1), 1.5)
-        drift = self.drift_rad_s + LEARNING * float(observed[2] - predicted[2]) / period_s
+        drift = self.drift_rad_s + settings.learning * float(observed[2] - predicted[2]) / period_s
         return Learned(stretch, min(max(drift, -1.0), 1.0), own)
 
 
@@ -133,23 +180,24 @@ def choose(
     learned: Learned,
     step: int | None = None,
     barred: Collection[int] = (),
+    settings: TrackSettings = DEFAULT_TRACK,
 ) -> Choice:
     """Return the best gait for the next cycle, none of those `barred`.
 
     `step` is the reference's node that the robot has come to; only nodes near it are looked at, so that
     a plan that crosses itself is followed in order.
     """
-    window = slice(None) if step is None else slice(max(step - 12, 0), step + 5 * NODES_PER_CYCLE)
+    window = slice(None) if step is None else slice(max(step - 12, 0), step + 5 * settings.nodes_per_cycle)
     near = reference.part(window)
     beam = [_Branch(where, 0.0, 0.0, None)]
-    for _ in range(HORIZON):
+    for _ in range(settings.horizon):
         grown = [
             new
             for old in beam
-            for new in ([old] if old.arrived else _grow(problem, near, old, learned, barred))
+            for new in ([old] if old.arrived else _grow(problem, near, old, learned, barred, settings))
         ]
         grown.sort(key=lambda branch: branch.cost + branch.ahead)
-        beam = grown[:BEAM]
+        beam = grown[: settings.beam]
     best = beam[0]
     assert best.first is not None  # every branch has grown
     offset = near.pose[:, :2] - best.where.pose[:2]
@@ -164,14 +212,21 @@ def by_plan(problem: Problem, where: Where, learned: Learned, gait: int) -> Choi
     return Choice(gait, local[gait, -1], math.inf, 0.0)
 
 
-def nearest_node(reference: Reference, pose: Array, after: int) -> int:
+def nearest_node(
+    reference: Reference, pose: Array, after: int, settings: TrackSettings = DEFAULT_TRACK
+) -> int:
     """Return the node nearest to a place, not before `after` and not far beyond it."""
-    window = reference.pose[after : after + 4 * NODES_PER_CYCLE, :2]
+    window = reference.pose[after : after + 4 * settings.nodes_per_cycle, :2]
     return after + int(np.hypot(*(window - pose[:2]).T).argmin())
 
 
 def _grow(
-    problem: Problem, reference: Reference, branch: _Branch, learned: Learned, barred: Collection[int]
+    problem: Problem,
+    reference: Reference,
+    branch: _Branch,
+    learned: Learned,
+    barred: Collection[int],
+    settings: TrackSettings,
 ) -> list[_Branch]:
     """Return the branch with every gait played after it, the best few; those `barred` do not come first."""
     motion, where = problem.motion, branch.where
@@ -180,22 +235,23 @@ def _grow(
     pose = compose(where.pose, local)
     speed = move.speed_m_s * learned.stretches(len(move.speed_m_s))
     place = np.concatenate([pose[:, -1, :2], (pose[:, -1, 2] + motion.course[:-1])[:, None]], axis=1)
-    offset = _offset(reference, place, speed, problem.robot.length_m)
-    order = np.argsort(offset, kind="stable")[: 3 * BEAM]
-    order = np.union1d(order, _planned(reference, where.pose))  # which nothing may resemble
+    offset = _offset(reference, place, speed, problem.robot.length_m, settings)
+    order = np.argsort(offset, kind="stable")[: 3 * settings.beam]
+    order = np.union1d(order, _planned(reference, where.pose, settings))  # which nothing may resemble
     order = order[motion.may_follow(where.gait)[order]]
     if branch.first is None:
         order = np.setdiff1d(order, list(barred))
     lines = points_in_room(motion.body[motion.row(where.gait), order, 1::_THIN], pose[order, 1::_THIN])
-    room, length = _room(problem, lines), problem.robot.length_m
+    room, length = _room(problem, lines, settings), problem.robot.length_m
     grown = []
     for gait, clearance in zip(map(int, order), map(float, room)):
         arrival = arrival_index(problem.goal, pose[gait])
         part = 1.0 if arrival is None else arrival / SAMPLES
-        lack = min(max(1 - clearance / (AIR * length), 0.0), 1.0)
-        cost = branch.cost + AIR_UNITS * lack**2 + CHANGE_UNITS * (gait != motion.row(where.gait))
-        cost += part * float(motion.period_s[gait]) / UNIT_S
-        cost += CONTACT_UNITS * (1 + lack) if clearance <= CONTACT * length else 0.0
+        lack = min(max(1 - clearance / (settings.air * length), 0.0), 1.0)
+        changes = gait != motion.row(where.gait)
+        cost = branch.cost + settings.air_units * lack**2 + settings.change_units * changes
+        cost += part * float(motion.period_s[gait]) / settings.unit_s
+        cost += settings.contact_units * (1 + lack) if clearance <= settings.contact * length else 0.0
         first = branch.first or Choice(gait, local[gait, -1], clearance, 0.0)
         after = Where(pose[gait, -1], gait, float(speed[gait]))
         ahead = float(offset[gait]) if arrival is None else 0.0
@@ -203,25 +259,27 @@ def _grow(
     return grown
 
 
-def _planned(reference: Reference, pose: Array) -> NDArray[np.int64]:
+def _planned(reference: Reference, pose: Array, settings: TrackSettings) -> NDArray[np.int64]:
     """Return the gaits that the plan plays near a place, one or two."""
     node = int(np.hypot(*(reference.pose[:, :2] - pose[:2]).T).argmin())
-    return reference.gait[node : node + NODES_PER_CYCLE // 2 + 1]
+    return reference.gait[node : node + settings.nodes_per_cycle // 2 + 1]
 
 
-def _room(problem: Problem, lines: Array) -> Array:
+def _room(problem: Problem, lines: Array, settings: TrackSettings) -> Array:
     """Return the clearance (gaits,) of bodies (gaits, samples, points, 2), exact where it is small."""
     flat = lines.reshape(-1, *lines.shape[2:])
     room = problem.body.estimate(flat)
-    close = room < AIR * problem.robot.length_m + problem.field.error_m
+    close = room < settings.air * problem.robot.length_m + problem.field.error_m
     if close.any():
         room[close] = problem.body.exact(flat[close], room[close])
     return np.asarray(room.reshape(lines.shape[:2]).min(axis=1))
 
 
-def _offset(reference: Reference, place: Array, speed: Array, length_m: float) -> Array:
+def _offset(
+    reference: Reference, place: Array, speed: Array, length_m: float, settings: TrackSettings
+) -> Array:
     """Return what places (n, 3) with speeds (n,) cost: deviation from the plan and time to go."""
     dx, dy, turn = (place[:, None, :] - reference.pose[None]).transpose(2, 0, 1)
-    off = (dx**2 + dy**2) / (PLACE * length_m) ** 2 + (wrapped(turn) / COURSE_RAD) ** 2
-    off = off + ((speed[:, None] - reference.speed_m_s) / (SPEED * length_m)) ** 2
-    return np.asarray((off + reference.left_s / UNIT_S).min(axis=1))
+    off = (dx**2 + dy**2) / (settings.place * length_m) ** 2 + (wrapped(turn) / settings.course_rad) ** 2
+    off = off + ((speed[:, None] - reference.speed_m_s) / (settings.speed * length_m)) ** 2
+    return np.asarray((off + reference.left_s / settings.unit_s).min(axis=1))

@@ -197,7 +197,7 @@ class Model:
         return ZeroCopy(_functions(self.full, self.forms, self._names, self.camera)[1])
 
     def __getstate__(self) -> dict[str, object]:  # buffers do not travel
-        return {k: v for k, v in self.__dict__.items() if k not in ("_packing", "_slopes")}
+        return {k: v for k, v in self.__dict__.items() if k not in ("_packing", "_jacobian")}
 
 
 def _in_compiled_equations(effect: Effect) -> bool:

@@ -108,7 +108,7 @@ def test_slopes_of_the_same_place_serve_again_whoever_is_asked(setting, monkeypa
     assert work.answer(["t"], Request(there, wider.coordinates, stale=True))["t"].stale
 
 
-@pytest.mark.parametrize("where", ["points", "derivatives"])
+@pytest.mark.parametrize("where", ["points", "jacobian"])
 def test_a_motion_without_finite_derivatives_is_no_place_for_a_fit(where, monkeypatch):
     robot = wpi_srs()
     base = base_coordinates(robot)

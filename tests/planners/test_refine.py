@@ -58,7 +58,7 @@ def test_slopes_are_those_of_finer_simulations(planned):
     joints = [problem.joints.joint(a, b) for a, b in pairwise(numbers[:4])]
     window = Window.of_cycles(joints, problem.joints.limits)
     (shot,) = shoot_windows(problem.integrator, start, [window])
-    jacobian = with_sensitivity(problem.integrator, start, shot).jacobian[-1][:3]
+    jacobian = with_sensitivity(problem.integrator, start, shot).sensitivity[-1][:3]
     x = window.unknowns()
     for column in range(1, window.size, 4):
         by = 1e-4 if column < window.size - window.cycles else 0.05
