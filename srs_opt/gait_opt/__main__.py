@@ -20,6 +20,7 @@ from srs_opt.command import (
     run_command,
     say,
 )
+from srs_opt.errors import InputError
 
 if TYPE_CHECKING:
     from srs_opt.gait_opt.collocation.problem import CycleProblem
@@ -59,6 +60,11 @@ def build_parser() -> Parser:
     )
     goal.add_argument("--envelope", type=positive_float, metavar="M", help="widest swept band, m")
     goal.add_argument("--table", action="store_true", help="build the gait table: JSON, CSV and C header")
+    goal.add_argument(
+        "--quick",
+        action="store_true",
+        help="with --table: few gaits in about a minute (fast, slim, two radii and their images)",
+    )
     _add_limits(parser)
     how = parser.add_argument_group("how")
     how.add_argument(
@@ -136,7 +142,6 @@ def _add_limits(parser: Parser) -> None:
 
 def problem_from(options: argparse.Namespace) -> CycleProblem:
     """Return the problem that the options describe."""
-    from srs_opt.errors import InputError
     from srs_opt.gait_opt.collocation.problem import CycleProblem
     from srs_opt.gait_opt.collocation.solver import Solver
     from srs_opt.gait_opt.goal import Goal
@@ -178,7 +183,6 @@ def problem_from(options: argparse.Namespace) -> CycleProblem:
 
 def softened(options: argparse.Namespace, robots: list[Robot]) -> list[Robot]:
     """Return the robots with the stiffnesses that are asked for, or that a robot's file leaves open."""
-    from srs_opt.errors import InputError
     from srs_opt.gait_opt.robust import of_stiffness, stiffness_interval
 
     if options.stiffness:
@@ -219,6 +223,8 @@ def run(options: argparse.Namespace) -> Answer:
     """Optimize, certify, write the files."""
     if options.table:
         return _run_table(options)
+    if options.quick:
+        raise InputError("--quick goes with --table")
     import shutil
     import time
     from functools import partial
@@ -295,10 +301,11 @@ def _robots_of_table(options: argparse.Namespace) -> tuple[tuple[Robot, ...], st
 
 def _run_table(options: argparse.Namespace) -> Answer:
     """Build the gait table and write it as JSON, CSV and C header."""
-    from srs_opt.errors import InputError
 
     if options.spread:
         raise InputError("--spread goes with one robust gait, not with --table")
+    if options.quick and options.warm:
+        raise InputError("--quick builds a new table: without --warm")
     if options.warm and (options.stiffness or options.robots):
         raise InputError("--table --warm moves one robot's table: without --stiffness and --robots")
     import shutil
@@ -313,7 +320,7 @@ def _run_table(options: argparse.Namespace) -> Answer:
     from srs_opt.gait_opt.catalogue import cached_table_path
     from srs_opt.gait_opt.entries import certified_table
     from srs_opt.gait_opt.export import write_csv
-    from srs_opt.gait_opt.report import if_soft, robust_words, soft_speeds
+    from srs_opt.gait_opt.report import if_soft, robust_words, table_record
     from srs_opt.gait_opt.table import load_table, save_table
     from srs_opt.judge.bodies import check_judge
     from srs_opt.judge.opinion import Case, opinions
@@ -331,14 +338,16 @@ def _run_table(options: argparse.Namespace) -> Answer:
     begun = time.perf_counter()
     limits = limits_from(options)
     unfinished = options.out / "table.unfinished"  # an interrupted table goes on from here
-    where = {"jobs": options.jobs, "cluster": options.cluster}
+    where: dict[str, Any] = {"jobs": options.jobs, "cluster": options.cluster}
     try:
         if options.warm:
             table = load_table(options.warm, robot)
             table = certified_table(robot, table, limits, partial(say, options), on_other_ticks=True, **where)
         else:
             worst = options.worst or "relative"
-            table = make_table(robots, model, limits, unfinished, worst, partial(say, options), **where)
+            table = make_table(
+                robots, model, limits, unfinished, worst, partial(say, options), quick=options.quick, **where
+            )
     except KeyboardInterrupt:
         kept = len(list(unfinished.glob("*.json")))
         say(options, f"\n{kept} optimizations are kept in {unfinished}; the same command goes on from there")
@@ -358,21 +367,12 @@ def _run_table(options: argparse.Namespace) -> Answer:
     if chosen and not options.robots:  # whose motion the table's is, and how far it may be off
         files.append(save_robot(robot, options.out / "nominal_robot.yaml"))
         hint = f"\n  to plan with it: plan MAZE --robot {files[-1]} --gaits {files[0]}"
-    if usual(limits) and not options.warm and not options.robots:  # then `plan` takes it without being told
+    whole = usual(limits) and not (options.warm or options.robots or options.quick)
+    if whole:  # then `plan` takes it without being told
         files.append(save_table(table, cached_table_path(robot, model)))
     shutil.rmtree(unfinished, ignore_errors=True)
-    fastest = max(table.gaits, key=lambda g: g.speed_m_s)
-    radii = [abs(g.radius_m) for g in table.gaits if g.radius_m is not None]
-    answer: dict[str, Any] = {
-        "objective": "table",
-        "gaits": len(table.gaits),
-        "speed_max_m_s": fastest.speed_m_s,
-        **soft_speeds(robot, fastest.gait, limits),
-        "radius_min_m": min(radii, default=None),
-        "band_min_m": min(sum(g.envelope_m) for g in table.gaits),
-        "solve_s": seconds,
-    }
-    words = f"{len(table.gaits)} gaits up to {fastest.speed_m_s:.3f} m/s in {seconds:.0f} s"
+    answer = table_record(robot, table, limits, seconds)
+    words = f"{len(table.gaits)} gaits up to {answer['speed_max_m_s']:.3f} m/s in {seconds:.0f} s"
     if chosen:
         answer["worst_speed_m_s"] = table.gaits[0].worst_speed_m_s
         words += robust_words(table, robots) + hint

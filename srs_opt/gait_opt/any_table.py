@@ -54,6 +54,7 @@ def make_table(
     *,
     jobs: int,
     cluster: str | None,
+    quick: bool = False,
 ) -> GaitTable:
     """Return the table of a robot, optimized, or of several, chosen; what is optimized is kept on the way.
 
@@ -63,11 +64,21 @@ def make_table(
         Where optimizations are kept until the table is done.
     worst : {"relative", "absolute"}
         What counts of several robots.
+    quick : bool
+        Few gaits, none for drivers alone.
     """
 
     def built(robot: Robot, model: str) -> GaitTable:
         return build_table(
-            robot, model, limits, say, jobs=jobs, cluster=cluster, resume=unfinished, driver=True
+            robot,
+            model,
+            limits,
+            say,
+            jobs=jobs,
+            cluster=cluster,
+            resume=unfinished,
+            driver=not quick,
+            quick=quick,
         )
 
     if len(robots) == 1:
@@ -77,7 +88,7 @@ def make_table(
     if basis is None:
         say("first the gaits of the rigid robot, to choose from")
         basis = built(rigid, "complex")
-        if usual(limits):
+        if usual(limits) and not quick:
             save_table(basis, cached_table_path(rigid))
     table = chosen_table(tuple(robots), model, basis, limits, worst, say, jobs=jobs)
     return certified_table(robots[0], table, limits, say, jobs=jobs, cluster=cluster)

@@ -58,10 +58,12 @@ def build_table(
     cluster: str | None = None,
     resume: Path | None = None,
     driver: bool = False,
+    quick: bool = False,
 ) -> GaitTable:
     """Return the table of `robot`: optimized left turns and straights, their images, all certified.
 
-    With `driver`, slow gaits and pivots follow, of which planners make no use.
+    With `driver`, slow gaits and pivots follow, of which planners make no use. A `quick` table holds four of
+    the optimized gaits with their images.
 
     Wishes out of reach are left out, and said so. With the folder `resume`, gaits found there are not
     optimized again; it is left for the caller to remove.
@@ -76,7 +78,7 @@ def build_table(
     frequency, pressure = work.limits.frequency_hz[1], work.limits.pressure_kpa[1]
     starts: dict[str | None, Gait] = {None: published_wave(robot, frequency, pressure).gait()}
     entries: dict[str, list[TableGait]] = {}
-    asked = table_specs(robot)
+    asked = table_specs(robot, quick=quick)
     for group in generations(asked):
         tasks = [Task(spec, starts[spec.after]) for spec in group]
         with executor(jobs, cluster) as where:

@@ -114,6 +114,21 @@ def soft_speeds(robot: Robot, gait: Gait, beside: Limits | None) -> dict[str, An
     }
 
 
+def table_record(robot: Robot, table: GaitTable, limits: Limits, solve_s: float) -> dict[str, Any]:
+    """Return the JSON object of a table's making."""
+    fastest = max(table.gaits, key=lambda g: g.speed_m_s)
+    radii = [abs(g.radius_m) for g in table.gaits if g.radius_m is not None]
+    return {
+        "objective": "table",
+        "gaits": len(table.gaits),
+        "speed_max_m_s": fastest.speed_m_s,
+        **soft_speeds(robot, fastest.gait, limits),
+        "radius_min_m": min(radii, default=None),
+        "band_min_m": min(sum(g.envelope_m) for g in table.gaits),
+        "solve_s": solve_s,
+    }
+
+
 def robust_words(table: GaitTable, robots: tuple[Robot, ...]) -> str:
     """Return what a table for several robots says of itself."""
     first = table.gaits[0]

@@ -14,6 +14,8 @@ TURN_BANDS = ((1.75, 1.5, 1.35), (1.75, 1.5, 1.35), (1.75, 1.5), (1.75, 1.5, 1.4
 # accelerates best. For the built-in robot the loads stand for 0.15 and 0.34 m/s2: what gathers the last
 # speed, and what sets off from rest.
 STRONG_LOAD, RUSH_LOAD = 0.35, 0.8
+# enough to see how a new robot goes and to plan through a wide maze: two radii, one slimmer band
+QUICK_RADII_OVER_LENGTH, QUICK_STRAIGHT_BANDS = (1.6, 0.6), (1.65,)
 STRONG_BANDS, STRONG_TURN_BANDS = (1.95, 1.75, 1.6), ((), (1.75,), (1.75,), (1.75,), ())
 RUSH_TURN_BANDS: tuple[tuple[float, ...], ...] = ((), (), (), ())
 
@@ -47,14 +49,17 @@ class TableSpec:
         return replace(robot, friction_tangential=(1 + self.load) * robot.friction_tangential)
 
 
-def table_specs(robot: Robot) -> tuple[TableSpec, ...]:
-    """Return what a table holds, forward and to the left; the other three quadrants are images.
+def table_specs(robot: Robot, *, quick: bool = False) -> tuple[TableSpec, ...]:
+    """Return what a table, or a quick one, holds, forward and to the left; the other quadrants are images.
 
     Fast gaits go from the straight one to the tightest turn; at every radius, bands go from the fast gait's
     to the slimmest. (A slim gait hardly leads to a slim one at another radius: its on-intervals are
     another matter altogether.) Strong gaits and those that rush off from rest do the same under their loads.
     """
-    fast = _fan(robot, TableSpec("fast", None, None, None), STRAIGHT_BANDS, TURN_BANDS)
+    first = TableSpec("fast", None, None, None)
+    if quick:
+        return _fan(robot, first, QUICK_STRAIGHT_BANDS, ((), ()), QUICK_RADII_OVER_LENGTH)
+    fast = _fan(robot, first, STRAIGHT_BANDS, TURN_BANDS)
     strong = TableSpec("strong", None, None, "fast", STRONG_LOAD)
     rush = TableSpec("rush", None, None, "strong", RUSH_LOAD)
     laden = _fan(robot, strong, STRONG_BANDS, STRONG_TURN_BANDS) + _fan(robot, rush, (), RUSH_TURN_BANDS)
@@ -62,13 +67,17 @@ def table_specs(robot: Robot) -> tuple[TableSpec, ...]:
 
 
 def _fan(
-    robot: Robot, first: TableSpec, straight: tuple[float, ...], turns: tuple[tuple[float, ...], ...]
+    robot: Robot,
+    first: TableSpec,
+    straight: tuple[float, ...],
+    turns: tuple[tuple[float, ...], ...],
+    radii_over_length: tuple[float, ...] = RADII_OVER_LENGTH,
 ) -> tuple[TableSpec, ...]:
     """Return the first spec, its narrower companions, and the same at every radius."""
     spine = robot.segments * robot.pitch_m
     found = [first, *_narrower(robot, first, straight)]
     wider = first
-    for share, bands in zip(RADII_OVER_LENGTH, turns):
+    for share, bands in zip(radii_over_length, turns):
         radius = round(share * spine, 3)
         wider = replace(first, name=f"{first.name} R{radius:g}", radius_m=radius, after=wider.name)
         found += [wider, *_narrower(robot, wider, bands)]

@@ -14,6 +14,7 @@ from srs_opt.controller.program import ControllerLimits, Program
 from srs_opt.errors import InputError
 from srs_opt.gait import Wave
 from srs_opt.gait_opt import family
+from srs_opt.gait_opt.__main__ import main
 from srs_opt.gait_opt.catalogue import default_table, shipped_table
 from srs_opt.gait_opt.continuation import Stage
 from srs_opt.gait_opt.export import write_csv
@@ -182,6 +183,19 @@ def test_nearest_gait(table):
     assert np.sign(table.nearest(0.4, -3.0).turn_rate_rad_s) == -1
 
 
+def test_a_quick_table_asks_for_little():
+    asked = table_specs(ROBOT, quick=True)
+    assert [spec.after for spec in asked] == [None, "fast", "fast", asked[2].name]
+    assert [spec.load for spec in asked] == [0.0] * 4
+    assert {spec.radius_m for spec in asked} < {spec.radius_m for spec in table_specs(ROBOT)}
+
+
+@pytest.mark.parametrize("words", [["--quick"], ["--table", "--quick", "--warm", "gait_table.json"]])
+def test_quick_is_for_new_tables(words, capsys):
+    assert main(words) == 2
+    assert "--quick" in capsys.readouterr().err
+
+
 @pytest.fixture
 def short_table(monkeypatch):
     """Make tables of three coarse gaits."""
@@ -190,7 +204,7 @@ def short_table(monkeypatch):
         TableSpec("b", None, 0.08, "a"),
         TableSpec("c R0.784", 0.784, None, "a"),
     )
-    monkeypatch.setattr(family, "table_specs", lambda robot: asked)
+    monkeypatch.setattr(family, "table_specs", lambda robot, quick: asked)
     monkeypatch.setattr(family, "continuation_stages", lambda own_m_s: (Stage(0.03, 30, 0.1, 1),))
 
 
