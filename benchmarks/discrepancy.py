@@ -71,9 +71,15 @@ def plan(sets: int, seed: int, kinds: Sequence[str]) -> list[tuple[str, tuple[st
 
 
 def generate(
-    folder: Path, kind: str, hidden: tuple[str, ...], seed: int, setting: str = "first"
+    folder: Path,
+    kind: str,
+    hidden: tuple[str, ...],
+    seed: int,
+    setting: str = "first",
+    *,
+    brief: bool = False,
 ) -> dict[str, Any]:
-    """Write one small set; return what is hidden in it."""
+    """Write one small set, or `brief` half a set of short trials; return what is hidden in it."""
     from virtual_lab.dataset import Recording, truth_file, write_dataset
     from virtual_lab.disturb import WRONG_ENTRIES
     from virtual_lab.draw import draw_truth
@@ -86,15 +92,17 @@ def generate(
     stated = 0.001 * float(rng.choice([0.5, 1.0, 2.0]))
     wrong = str(rng.choice(list(WRONG_ENTRIES))) if kind == "bad" else ""
     recording = replace(Recording(stated_sd_m=stated, wrong_entry=wrong), **DISTURBED[setting])
-    trials = small_design(np.random.default_rng([seed, 5]))
+    trials = small_design(np.random.default_rng([seed, 5]), 1.5 if brief else 4.0)[: 6 if brief else None]
     write_dataset(folder, truth, trials, seed, recording)
     bad = json.loads(truth_file(folder).read_text(encoding="utf-8"))["wrong_trial"]
     effects = [dict(e) for e in (*truth.effects, *truth.unlisted)]
     return {"effects": effects, "wrong_entry": wrong, "wrong_trial": bad}
 
 
-def examine(kind: str, hidden: tuple[str, ...], seed: int, setting: str = "first") -> Row:
-    """Generate and examine one set."""
+def examine(
+    kind: str, hidden: tuple[str, ...], seed: int, setting: str = "first", *, brief: bool = False
+) -> Row:
+    """Generate and examine one set, see `generate`."""
     from benchmarks.discrepancy_baselines import baselines
     from srs_opt.discrepancy.answer import answer
     from srs_opt.discrepancy.pipeline import diagnose
@@ -102,7 +110,7 @@ def examine(kind: str, hidden: tuple[str, ...], seed: int, setting: str = "first
 
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch) / "set"
-        truth = generate(folder, kind, hidden, seed, setting)
+        truth = generate(folder, kind, hidden, seed, setting, brief=brief)
         row: Row = {"kind": kind, "setting": setting, "hidden": list(hidden), "seed": seed}
         row |= {"truth": truth["effects"], **{k: truth[k] for k in ("wrong_entry", "wrong_trial")}}
         dataset = load_dataset(folder)
@@ -250,7 +258,8 @@ def _said(row: Row) -> str:
 
 
 def run(quick: bool) -> Section:
-    """Return the rates of the stored studies; one set, measured now, where there is none or to be quick."""
+    """Return the rates of the stored studies; one brief set, measured now, where there is none or to be
+    quick."""
     lines: list[list[str]] = []
     notes: list[str] = []
     for setting in DISTURBED:
@@ -259,7 +268,7 @@ def run(quick: bool) -> Section:
         if stored is None and setting != "first":
             continue
         if stored is None:
-            stored = "now, one set only", [examine(*plan(1, 1, ("null",))[0])]
+            stored = "now, one brief set only", [examine(*plan(1, 1, ("null",))[0], brief=True)]
         measured, rows = stored
         lines += [[f"{setting}, {what}", *rest] for what, *rest in rates(rows)]
         notes += [

@@ -92,7 +92,7 @@ def described(rows: Iterable[Row]) -> list[tuple[str, list[bool], str]]:
     ]
 
 
-def examine(hidden: str, seed: int) -> Row:
+def examine(hidden: str, seed: int, *, brief: bool = False) -> Row:
     """Generate one set, calibrate, and describe what is left."""
     from benchmarks.discrepancy import generate
     from srs_opt.calibrate.candidates import effect_spec, fitted_coordinates
@@ -106,7 +106,7 @@ def examine(hidden: str, seed: int) -> Row:
 
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch) / "set"
-        truth = generate(folder, "unlisted", (hidden,), seed)
+        truth = generate(folder, "unlisted", (hidden,), seed, brief=brief)
         dataset = load_dataset(folder)
     split = split_trials(dataset.trials)
     quick = few_and_brief(split.open)
@@ -140,10 +140,11 @@ def plan(sets: int, seed: int) -> list[tuple[str, int]]:
 
 
 def run(quick: bool) -> Section:
-    """Return the rates of the stored study; one set, measured now, where there is none or to be quick."""
+    """Return the rates of the stored study; one brief set, measured now, where there is none or to be
+    quick."""
     stored = None if quick else stored_rows("discrepancy_described")
     if stored is None:
-        stored = "now, one set only", [examine("stiff_wheel", 1)]
+        stored = "now, one brief set only", [examine("stiff_wheel", 1, brief=True)]
     measured, rows = stored
     columns = ["what is counted", "rate", "99 % interval", "goal"]
     table = []

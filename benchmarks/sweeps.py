@@ -17,7 +17,10 @@ def run(quick: bool) -> Section:
 
     robot = wpi_srs()
     offsets = [0.0, 0.4] if quick else [0.0, 0.2, 0.4, 0.6]
-    points = grid_points(list(np.linspace(1, 2, 16)), list(np.linspace(41, 55, 12)), offsets, [1.2])
+    frequencies, pressures = (4, 3) if quick else (16, 12)
+    points = grid_points(
+        list(np.linspace(1, 2, frequencies)), list(np.linspace(41, 55, pressures)), offsets, [1.2]
+    )
     with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
         address = str(cluster.scheduler_address)
         ways: dict[str, Callable[[], GaitMap]] = {
