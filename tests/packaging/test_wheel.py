@@ -120,11 +120,11 @@ def test_installs_and_runs_in_a_clean_environment(version, built, tmp_path):
     if python is None:
         pytest.skip(f"no Python {version} on this machine (looked on PATH and in pyenv)")
     sdist, wheel = built
-    run(python, "-m", "venv", tmp_path / "venv")
+    run(python, "-m", "venv", "--without-pip", tmp_path / "venv")
     clean = tmp_path / "venv" / ("Scripts" if os.name == "nt" else "bin")
     package = sdist if version == PYTHONS[0] else wheel
-    constraints = ROOT / "constraints.txt"
-    run(clean / "python", "-m", "pip", "install", "--quiet", "--no-compile", "-c", constraints, package)
+    pip = (sys.executable, "-m", "pip", "--python", clean / "python")
+    run(*pip, "install", "--quiet", "--no-compile", "-c", ROOT / "constraints.txt", package)
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()
     answer = json.loads(run(clean / "python", "-c", CHECK, cwd=elsewhere))
