@@ -336,14 +336,14 @@ def test_random_robots_and_gaits_have_steady_states(links):
 @pytest.mark.parametrize(("links", "seconds"), [(20, 500)])
 def test_long_robots_compile_and_run_in_acceptable_time(links, seconds):
     """Compiling grows about linearly with the links; generous limits. Bends of about 1 rad."""
-    import time
+    import os
 
     robot = wpi_srs().with_values(links=links)
-    started = time.perf_counter()
+    started = sum(os.times()[:4])  # processor time, the compiler's too
     orbit = steady_gait(
         robot, Wave.uniform(links - 1, 1.0, 4 / 0.037 / links / 0.35, 2 * math.pi / (links - 1)).gait()
     )
-    assert time.perf_counter() - started < seconds
+    assert sum(os.times()[:4]) - started < seconds
     assert orbit.speed_m_s > 0
 
 

@@ -132,10 +132,10 @@ def test_damaged_images(folder, data):
 def test_junk_is_refused_soon(folder, ending, junk):
     path = folder / f"junk{ending}"
     path.write_bytes(junk)
-    begun = time.perf_counter()
+    begun = time.process_time()
     with pytest.raises(InputError, match="junk"):
         load_maze(path)
-    assert time.perf_counter() - begun < 5
+    assert time.process_time() - begun < 5
 
 
 @pytest.mark.parametrize("ending", sorted(ENDINGS))

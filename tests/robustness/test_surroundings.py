@@ -1,6 +1,8 @@
 """The commands where things go wrong around them: disks, folders, locales, compilers, displays, Ctrl-C."""
 
+import contextlib
 import json
+import math
 import os
 import resource
 import signal
@@ -41,6 +43,12 @@ def run(arguments: list[str], *more: object, **environment: str) -> subprocess.C
     return subprocess.run(line, capture_output=True, timeout=300, check=False, **options)
 
 
+def children_s() -> float:
+    """Return the processor time of the processes that have ended: a busy machine does not add to it."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
 def one_line(done: subprocess.CompletedProcess) -> str:
     lines = [x for x in done.stderr.strip().splitlines() if not x.startswith("note:")]
     assert len(lines) == 1, done.stderr
@@ -68,11 +76,11 @@ def test_out_is_a_file(arguments, tmp_path):
 )
 def test_out_is_a_file_is_said_before_the_work(arguments, tmp_path):
     (tmp_path / "taken.txt").write_text("mine")
-    began = time.perf_counter()
+    began = children_s()
     done = run(arguments, "--out", tmp_path / "taken.txt")
     assert done.returncode == 2
     assert "taken.txt: cannot write" in one_line(done)
-    assert time.perf_counter() - began < 20
+    assert children_s() - began < 20
     assert (tmp_path / "taken.txt").read_text() == "mine"
 
 
@@ -82,11 +90,11 @@ def test_out_is_a_file_is_said_before_the_work(arguments, tmp_path):
 )
 def test_read_only_folder(arguments):
     """Said at once, not after minutes of work."""
-    began = time.perf_counter()
+    began = children_s()
     done = run(arguments, "--out", "/proc/srs", "--quiet")
     assert done.returncode == 2
     assert "cannot write" in one_line(done)
-    assert time.perf_counter() - began < 20
+    assert children_s() - began < 20
 
 
 def test_disk_full(tmp_path):
@@ -217,8 +225,27 @@ LONG = {
 }
 
 
+def session_s(leader: int) -> float:
+    """Return the processor time that a session's processes have had: how far they are, however busy it is.
+
+    Where the system does not say, infinite after some seconds.
+    """
+    found = 0.0
+    for file in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):  # a process that has just ended
+            fields = file.read_text().rpartition(")")[2].split()
+            found += (int(fields[11]) + int(fields[12])) * (int(fields[3]) == leader)
+    if not Path("/proc/self/stat").exists():
+        time.sleep(8.0)
+        return math.inf
+    return found / os.sysconf("SC_CLK_TCK")
+
+
 def interrupt(arguments: list[str], folder: Path, after_s: float) -> subprocess.CompletedProcess:
-    """Run a command in a session of its own and send it what a terminal's Ctrl-C sends: SIGINT to all."""
+    """Run a command in a session of its own and send it what a terminal's Ctrl-C sends: SIGINT to all.
+
+    Not before its processes have had `after_s` of processor time.
+    """
     line, options = command(arguments, "--out", folder)
     running = subprocess.Popen(
         line,
@@ -229,7 +256,9 @@ def interrupt(arguments: list[str], folder: Path, after_s: float) -> subprocess.
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
         **options,
     )
-    time.sleep(after_s)
+    end = time.monotonic() + 20 * after_s
+    while session_s(running.pid) < after_s and time.monotonic() < end and running.poll() is None:
+        time.sleep(0.05)
     assert running.poll() is None, "it ended before it could be interrupted"
     os.killpg(running.pid, signal.SIGINT)
     try:
@@ -243,7 +272,7 @@ def interrupt(arguments: list[str], folder: Path, after_s: float) -> subprocess.
 
 @pytest.mark.parametrize("name", LONG)
 def test_ctrl_c_leaves_nothing_half_written(name, tmp_path):
-    done = interrupt(LONG[name], tmp_path, 4.0)
+    done = interrupt(LONG[name], tmp_path, 2.5)
     assert done.returncode == 130, done.stderr
     assert "Traceback" not in done.stderr
     assert "interrupted" in done.stderr
@@ -261,7 +290,7 @@ def test_ctrl_c_in_long_work(name, tmp_path):
     if name == "discrepancy":
         run(["virtual_lab", "--effect", "stribeck", "--quiet", "--out", str(tmp_path / "set")])
         arguments = ["srs_opt.discrepancy", str(tmp_path / "set"), "--jobs", "2"]
-    done = interrupt(arguments, tmp_path / "out", 8.0)
+    done = interrupt(arguments, tmp_path / "out", 8.0 if name == "table" else 5.0)  # workers start up too
     assert done.returncode in ((0, 1, 130) if name == "gait_opt" else (130,)), done.stderr
     assert "Traceback" not in done.stderr
     assert not left_behind(tmp_path)
