@@ -53,8 +53,9 @@ class Packed:
         Parameters of the full structure.
     camera : array (C,)
         Parameters of the effects that change where points are seen.
-    delay_s, clock_s, clock_rate : array (1,)
-        Of the valves, beyond the robot's own; the sample labelled t was taken at t (1 + rate) + clock.
+    delay_s, clock_s, clock_rate, marker_lag_s : array (1,)
+        Of the valves, beyond the robot's own; the sample labelled t was taken at t (1 + rate) + clock, of
+        each marker a lag later than of the one before it.
     """
 
     p: np.ndarray
@@ -62,6 +63,7 @@ class Packed:
     delay_s: np.ndarray
     clock_s: np.ndarray
     clock_rate: np.ndarray
+    marker_lag_s: np.ndarray
 
 
 class Model:
@@ -87,6 +89,8 @@ class Model:
         The effects that change where points are seen: those of the markers before the camera's.
     clock_drifts : bool
         Whether an effect makes the camera's clock run fast or slow.
+    markers_lag : bool
+        Whether an effect makes the camera see one marker after the other.
 
     Raises
     ------
@@ -107,6 +111,7 @@ class Model:
             e.name for e in sorted(effects, key=lambda e: e.marker is None) if e.seen_by_camera
         )
         self.clock_drifts = any(e.clock_rate for e in effects)
+        self.markers_lag = any(e.marker_lag for e in effects)
         linear = tuple(e for e in effects if not e.nonlinear_actuator)
         groups = [_occurrences(group) for group in ((), linear, effects)]
         self.rigid, self.soft = (
@@ -227,7 +232,7 @@ def _layout(structure: Structure, full: Structure) -> tuple[str, ...]:
 def _functions(
     full: Structure, forms: tuple[Form, ...], names: tuple[str, ...], seen: tuple[str, ...]
 ) -> tuple[ca.Function, ca.Function]:
-    """Return ``(coordinates, bench, conditions) -> (p, camera, delay, clock, rate)``, and the Jacobians."""
+    """Return ``(coordinates, bench, conditions) -> (p, camera, delay, clock, rate, lag)``, and Jacobians."""
     z, now = ca.SX.sym("z", len(names)), ca.SX.sym("now", len(_CONDITIONS))
     values = {name: z[k] for k, name in enumerate(names)}
     robot_names = [n for n in names if "." not in n]
@@ -237,7 +242,7 @@ def _functions(
     own = {e.name: [_over_places(e, forms, values, now[2], c) for c in range(Form(e).copies)]
            for e in dict.fromkeys(f.effect for f in forms)}  # fmt: skip
     known = known_effects()
-    delay, clock, rate = ca.SX(0), ca.SX(0), ca.SX(0)
+    delay, clock, rate, lag = ca.SX(0), ca.SX(0), ca.SX(0), ca.SX(0)
     for name, copies in own.items():
         effect, e = known[name], copies[0]
         if not _in_compiled_equations(effect):
@@ -254,11 +259,12 @@ def _functions(
         delay = delay + effect.delay(e) if effect.delay else delay
         clock = clock + effect.clock(e) if effect.clock else clock
         rate = rate + effect.clock_rate(e) if effect.clock_rate else rate
+        lag = lag + effect.marker_lag(e) if effect.marker_lag else lag
     p = [robot[n] for n in full.parameter_names]
     for k, name in enumerate(full.effects):
         p += list(own[name][k - full.effects.index(name)].values())
     camera = [v for name in seen for v in own[name][0].values()]
-    outputs = [ca.vertcat(*p), ca.vertcat(*camera), delay, clock, rate]
+    outputs = [ca.vertcat(*p), ca.vertcat(*camera), delay, clock, rate, lag]
     inputs = [z, bench, now]
     jacobian = [ca.densify(ca.jacobian(o, z)) for o in outputs]
     options = {"cse": True}

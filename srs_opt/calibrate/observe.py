@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import casadi as ca
@@ -139,6 +139,33 @@ def predict(
     nodes : Nodes
         The trial simulated at `values`.
     """
+    markers = 1 if centre_only else model.links if trial.spots is None else len(trial.spots)
+    if nodes.marker_lag_s == 0 or markers == 1:
+        return _at_once(model, trial, nodes, values, coordinates, centre_only=centre_only)
+    frames, at_once = trial.time_s.size, replace(nodes, marker_lag_s=0.0)
+    later = nodes.marker_lag_s * np.arange(markers)[:, None]
+    every = replace(trial, time_s=(trial.time_s + later).ravel())
+    seen = _at_once(model, every, at_once, values, coordinates, centre_only=centre_only)
+    own = np.arange(markers)
+
+    def each(values: np.ndarray) -> np.ndarray:
+        """Return of every marker what was seen at its own times."""
+        whole = values.reshape(markers, frames, markers, 2, *values.shape[2:])[own, :, own]
+        return np.moveaxis(whole, 0, 1).reshape(frames, 2 * markers, *values.shape[2:])
+
+    return Prediction(each(seen.points), each(seen.jacobian), seen.pose[:frames], seen.kappa[:frames])
+
+
+def _at_once(
+    model: Model,
+    trial: Trial,
+    nodes: Nodes,
+    values: Values,
+    coordinates: Sequence[Coordinate],
+    *,
+    centre_only: bool,
+) -> Prediction:
+    """Return what the camera sees of all markers at the trial's labels."""
     at = trial.time_s * (1 + nodes.clock_rate) + nodes.clock_s
     rate = _pose_rate(model, nodes, values)
     pose = hermite(nodes.time_s, nodes.body[:, :3], rate, at)
@@ -187,6 +214,9 @@ def predict(
     jacobian[:, :, later != 0] += in_time * later[later != 0]
     faster = by.clock_rate[0]
     jacobian[:, :, faster != 0] += in_time * trial.time_s[:, None, None] * faster[faster != 0]
+    lagging = by.marker_lag_s[0]
+    order = np.repeat(np.arange(seen // 2), 2)[None, :, None]
+    jacobian[:, :, lagging != 0] += in_time * order * lagging[lagging != 0]
     shown = np.any(by.camera != 0, axis=0)
     jacobian[:, :, shown] += jac_camera @ by.camera[:, shown]
     return Prediction(points, jacobian, pose, kappa)

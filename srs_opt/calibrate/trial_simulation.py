@@ -32,6 +32,7 @@ WASTEFUL = 0.3  # share of its steps that would do, below which a mesh is made a
 SAME_S = 1e-12  # durations of phases nearer than this are the same, and differ by rounding
 _TAIL_S = 0.05  # simulated beyond the last label, for clocks that run late
 _FASTEST_CLOCK = 0.03  # times as long beyond it where clocks may run fast
+_LATEST_S = 0.03  # by which a marker may be seen later than the one before it
 # (tolerance, cycle) -> what the valves did, and the mesh that served
 Meshes = dict[tuple[float, int], tuple[tuple[float, ...], Mesh]]
 
@@ -55,6 +56,8 @@ class Nodes:
         Packed parameters of the full structure, and of what the camera sees.
     clock_s, clock_rate : float
         The sample labelled t was taken at t (1 + clock_rate) + clock_s.
+    marker_lag_s : float
+        By how much later every marker is seen than the one before it.
     """
 
     time_s: np.ndarray
@@ -69,6 +72,7 @@ class Nodes:
     camera: np.ndarray
     clock_s: float
     clock_rate: float = 0.0
+    marker_lag_s: float = 0.0
 
     def shape(self, layout: StateLayout) -> np.ndarray:
         """Return the body's shape (n + 1, ...) as `layout` has it."""
@@ -88,9 +92,11 @@ def tolerance_for(values: int, sd_m: float) -> float:
     return min(TOLERANCE_M_S, max(FINEST_M_S, needed))
 
 
-def timeline_of(trial: Trial, segments: int, fastest_clock: float = 0.0) -> Timeline:
+def timeline_of(
+    trial: Trial, segments: int, fastest_clock: float = 0.0, latest_marker_s: float = 0.0
+) -> Timeline:
     """Return what the valves do in a trial, a little longer than it was recorded."""
-    end = float(trial.time_s[-1]) * (1 + fastest_clock) + _TAIL_S
+    end = float(trial.time_s[-1]) * (1 + fastest_clock) + _TAIL_S + latest_marker_s
     if trial.kind == "still":
         return Timeline.vent(segments, end, trial.pressure_kpa)
     if trial.applied is not None:
@@ -143,7 +149,8 @@ class TrialRun:
         self.model, self.trial = model, trial
         self.conditions = conditions_of(trial)
         fastest = _FASTEST_CLOCK if model.clock_drifts else 0.0
-        self.timeline = timeline_of(trial, model.segments, fastest)
+        latest_s = _LATEST_S * model.segments if model.markers_lag else 0.0
+        self.timeline = timeline_of(trial, model.segments, fastest, latest_s)
         self.meshes: Meshes = {}
 
     def __call__(self, values: Values, tolerance_m_s: float = TOLERANCE_M_S) -> Nodes:
@@ -269,6 +276,7 @@ def _nodes(
         camera=packed.camera,
         clock_s=float(packed.clock_s[0]),
         clock_rate=float(packed.clock_rate[0]),
+        marker_lag_s=float(packed.marker_lag_s[0]),
     )
 
 

@@ -43,6 +43,9 @@ class Settings:
         Terms that are fitted, the best of the screens.
     exchanges : int
         Rounds of looking for a better term from where the best one stands.
+    hopeful : float
+        Share of what the best of a screen promises from which on a term can be the better one. Twice as much
+        would leave out terms of which slopes far from the fit say little.
     bench : float
         Standard deviations that a calibrated value may lie from its bench value; twice what it may with a
         named effect, because a term is a simple likeness of what is there.
@@ -57,6 +60,7 @@ class Settings:
     lead: float = 0.5
     refits: int = 7
     exchanges: int = 3
+    hopeful: float = 0.1
     bench: float = 7.0
     explained: float = 0.02
     told: float = 20.0
@@ -208,12 +212,24 @@ def _fitted(search: Search, null: Fit, settings: Settings) -> list[Hypothesis]:
         leader = min(found.values(), key=_left, default=None)
         if leader is None or _left(leader) < settings.explained * _left(first):
             break
+        others = [c for c in _hopeful(screens, settings) if c.label not in found]
+        brief.candidates = (*leader.candidates, *others)
         lin = brief.examine(leader).linearisation
-        others = [c for c in search.candidates if c.label not in found]
         for score in screen(lin, others, dropped=leader.candidates)[:2]:
             attempt(lin, score)
         if min(found.values(), key=_left) is leader:
             break
+    return list(found.values())
+
+
+def _hopeful(screens: Sequence[Sequence[tuple[Linearisation, Score]]], settings: Settings) -> list[Candidate]:
+    """Return the terms of which a screen promises a share of what it does of its best."""
+    found = {
+        score.candidate.label: score.candidate
+        for scores in screens
+        for _, score in scores
+        if score.improvement >= settings.hopeful * scores[0][1].improvement
+    }
     return list(found.values())
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import casadi as ca
@@ -36,6 +36,8 @@ class LinkState:
         Speeds in wheel axes.
     curvature : SX (N, 1)
         Mean of the neighbouring segments, 1/m.
+    time_s : SX
+        Since the start of the motion, for effects that are `timed`; else zero.
     """
 
     room_x: ca.SX
@@ -51,6 +53,7 @@ class LinkState:
     along: ca.SX
     across: ca.SX
     curvature: ca.SX
+    time_s: ca.SX = field(default_factory=lambda: ca.SX(0))
 
 
 @dataclass(frozen=True)
@@ -66,12 +69,15 @@ class Actuation:
     pressure_kpa : SX
     time_s : SX
         Since the start of the motion, for effects that are `timed`; else zero.
+    memory : SX
+        The effect's own state; zero where it has none.
     """
 
     valve: ca.SX
     kappa: ca.SX
     pressure_kpa: ca.SX
     time_s: ca.SX
+    memory: ca.SX
 
 
 @dataclass(frozen=True)
@@ -109,10 +115,12 @@ class Effect:
     slowness : hook (e, Actuation); the same, for what depends on more.
     restoring : hook (e, kappa, memory); added to the restoring curvature.
     memory_rate : hook (e, dkappa, memory); rate of the effect's own state per segment.
+    state_rate : hook (e, Actuation); the same, for what depends on the valves.
     delay : hook (e); added to the valves' delay, s.
     marker : hook (e, x, y, theta); where the camera's markers sit, room coordinates (m).
     camera : hook (e, x, y); where a point of the room is seen (m).
     clock, clock_rate : hooks (e); the sample labelled t was taken at t (1 + clock_rate) + clock.
+    marker_lag : hook (e); by how much later every marker is seen than the one before it, from the tail on, s.
     timed : bool
         Whether its hooks depend on the time since the start of the motion.
     """
@@ -145,11 +153,13 @@ class Effect:
     slowness: Callable[[Symbols, Actuation], ca.SX] | None = None
     restoring: Callable[[Symbols, ca.SX, ca.SX], ca.SX] | None = None
     memory_rate: Callable[[Symbols, ca.SX, ca.SX], ca.SX] | None = None
+    state_rate: Callable[[Symbols, Actuation], ca.SX] | None = None
     delay: Callable[[Mapping[str, Any]], Any] | None = None
     marker: Callable[[Symbols, ca.SX, ca.SX, ca.SX], tuple[ca.SX, ca.SX]] | None = None
     camera: Callable[[Symbols, ca.SX, ca.SX], tuple[ca.SX, ca.SX]] | None = None
     clock: Callable[[Mapping[str, Any]], Any] | None = None
     clock_rate: Callable[[Mapping[str, Any]], Any] | None = None
+    marker_lag: Callable[[Mapping[str, Any]], Any] | None = None
     timed: bool = False
 
     @property
@@ -185,12 +195,12 @@ class Effect:
     @property
     def nonlinear_actuator(self) -> bool:
         """Whether the curvature loses its closed form."""
-        return self.timed or bool(self.hooks & {"slow_down", "slowness", "restoring"})
+        return self.timed or bool(self.hooks & {"slow_down", "slowness", "restoring", "state_rate"})
 
     @property
     def remembers(self) -> bool:
-        """Whether the segments have a further state: the effect's own, or the time."""
-        return self.timed or self.memory_rate is not None
+        """Whether the segments have a further state, the effect's own."""
+        return bool(self.hooks & {"memory_rate", "state_rate"})
 
     @property
     def knows_the_room(self) -> bool:
@@ -204,7 +214,7 @@ class Effect:
 
 
 # hooks that act on the valves' schedule, or on what is seen
-OUTSIDE = frozenset({"delay", "marker", "camera", "clock", "clock_rate"})
+OUTSIDE = frozenset({"delay", "marker", "camera", "clock", "clock_rate", "marker_lag"})
 HOOKS = tuple(f.name for f in dataclasses.fields(Effect) if str(f.type).startswith("Callable"))
 
 

@@ -10,22 +10,33 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from srs_opt.effects.effect import Actuation
+from srs_opt.effects.effect import Actuation, Effect, Symbols
 from srs_opt.model.actuator_law import acceleration, held
 from srs_opt.model.parameters import Parameters
 
 
 @dataclass(frozen=True)
 class ActuatorState:
-    """Curvature (1/m), its rate (1/(m s)) and the memory of hysteresis-like effects, (N-1, 1) each."""
+    """Curvature (1/m), its rate (1/(m s)) and the memory of hysteresis-like effects, (N-1, 1) each; the time.
+
+    The time (s) is there where effects depend on it.
+    """
 
     kappa: ca.SX
     dkappa: ca.SX
     memory: tuple[ca.SX, ...] = ()
+    clock: ca.SX | None = None
+
+    @property
+    def time_s(self) -> ca.SX:
+        """Time since the start of the motion; zero where no effect depends on it."""
+        return ca.SX(0) if self.clock is None else self.clock
 
     def vector(self) -> ca.SX:
         """Return the stacked state."""
-        return ca.vertcat(self.kappa, self.dkappa, *self.memory)
+        return ca.vertcat(
+            self.kappa, self.dkappa, *self.memory, *([] if self.clock is None else [self.clock])
+        )
 
 
 class Actuator:
@@ -36,18 +47,19 @@ class Actuator:
         self.segments = parameters.structure.segments
         self.linear = not any(effect.nonlinear_actuator for effect, _ in parameters.effects)
         self.memories = sum(effect.remembers for effect, _ in parameters.effects)
-        self.states = self.segments * (2 + self.memories)
+        self.timed = any(effect.timed for effect, _ in parameters.effects)
+        self.states = self.segments * (2 + self.memories) + self.timed
 
     def unstack(self, vector: ca.SX) -> ActuatorState:
         """Split a stacked state."""
         n = self.segments
         parts = [vector[i * n : (i + 1) * n] for i in range(2 + self.memories)]
-        return ActuatorState(parts[0], parts[1], tuple(parts[2:]))
+        return ActuatorState(parts[0], parts[1], tuple(parts[2:]), vector[-1] if self.timed else None)
 
     def target(self, valve: ca.SX, state: ActuatorState | None = None) -> ca.SX:
         """Return the curvature K that each segment settles at, for valve states in [-1, 1], (N-1, 1).
 
-        Effects that depend on time ask for the `state`.
+        Effects that depend on time or have a state of their own ask for the `state`.
         """
         p, none = self.parameters, ca.SX.zeros(self.segments, 1)
         amplitude = p["curvature_per_pressure_1_m_kpa"] * p["pressure_kpa"]
@@ -56,8 +68,8 @@ class Actuator:
         for effect, e in p.effects:
             memory = next(memories, none) if effect.remembers else none
             if effect.command is not None:
-                kappa = state.kappa if state else none
-                valve = effect.command(e, Actuation(valve, kappa, p["pressure_kpa"], memory))
+                kappa, time = (state.kappa, state.time_s) if state else (none, ca.SX(0))
+                valve = effect.command(e, Actuation(valve, kappa, p["pressure_kpa"], time, memory))
             if effect.gain is not None:
                 amplitude = amplitude * effect.gain(e, p["frequency_hz"])
             if effect.bias is not None:
@@ -74,21 +86,19 @@ class Actuator:
             memory = ca.SX.zeros(self.segments, 1)
             if effect.remembers:
                 memory = state.memory[len(memory_rates)]
-                own = (
-                    effect.memory_rate(e, state.dkappa, memory)
-                    if effect.memory_rate
-                    else ca.SX.ones(memory.shape)
-                )
-                memory_rates.append(own)
+            acting = Actuation(valve, state.kappa, p["pressure_kpa"], state.time_s, memory)
+            if effect.remembers:
+                memory_rates.append(_memory_rate(effect, e, state, acting))
             if effect.restoring is not None:
                 restoring = restoring + effect.restoring(e, state.kappa, memory)
             if effect.slow_down is not None:
                 slow = slow * effect.slow_down(e, valve, state.kappa)
             if effect.slowness is not None:
-                slow = slow * effect.slowness(e, Actuation(valve, state.kappa, p["pressure_kpa"], memory))
+                slow = slow * effect.slowness(e, acting)
         tau1, tau2 = p["tau1_s"] * slow, p["tau2_s"] * slow
         ddkappa = acceleration(self.target(valve, state), restoring, state.dkappa, tau1, tau2)
-        return ActuatorState(state.dkappa, ddkappa, tuple(memory_rates))
+        clock = None if state.clock is None else ca.SX(1)
+        return ActuatorState(state.dkappa, ddkappa, tuple(memory_rates), clock)
 
     def jerk(self, state: ActuatorState, valve: ca.SX) -> ca.SX:
         """Return the curvatures' third time derivatives while the valves are held, (N-1, 1)."""
@@ -112,3 +122,10 @@ class Actuator:
         k3 = slope(x + time / 2 * k2)
         k4 = slope(x + time * k3)
         return self.unstack(x + time / 6 * (k1 + 2 * k2 + 2 * k3 + k4))
+
+
+def _memory_rate(effect: Effect, e: Symbols, state: ActuatorState, acting: Actuation) -> ca.SX:
+    if effect.memory_rate is not None:
+        return effect.memory_rate(e, state.dkappa, acting.memory)
+    assert effect.state_rate is not None
+    return effect.state_rate(e, acting)

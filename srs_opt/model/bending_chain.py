@@ -76,7 +76,9 @@ class BendingChain:
         """
         model, n = self.model, self.links
         m = self.motion(y, dy, ddy, h, drive)
-        f = self.forces(m.place, m.velocity, m.cos, m.sin, drive.frame, self.chambers(drive).kappa(y))
+        f = self.forces(
+            m.place, m.velocity, m.cos, m.sin, drive.where_and_when, self.chambers(drive).kappa(y)
+        )
         net_x, net_y = h * f.x - model.mass * m.acceleration[0], h * f.y - model.mass * m.acceleration[1]
         joint = self.joint_forces(net_x, net_y)
         q = self._moment(y, dy, drive) * h
@@ -92,19 +94,19 @@ class BendingChain:
     def rate_in_time(self, y: ca.SX, dy: ca.SX, ddy: ca.SX, drive: Drive, jerk: ca.SX) -> tuple[ca.SX, ca.SX]:
         """Return the derivatives of g and the friction power by time at fixed Y, Y', Y''."""
         rate, acceleration = drive.no_load_rate, drive.no_load_acceleration
-        if not self.model.stretches:
+        if not (self.model.stretches or self.model.ages):
             zero = ca.SX.zeros(self.links - 1, 1)
             q = self.model.moment(zero, zero, rate, acceleration) * self._share(self.chambers(drive))
             return ca.vertcat(0, 0, ca.vertcat(0, q) - ca.vertcat(q, 0)), ca.SX(0)
         state = [ca.SX.sym(name, self.size) for name in ("y", "dy", "ddy")]
         free = [ca.SX.sym(name, self.links - 1) for name in ("free", "rate", "acceleration", "jerk")]
-        frame, p = ca.SX.sym("frame", 3), self.model.parameters.vector
+        frame, time, p = ca.SX.sym("frame", 3), ca.SX.sym("time"), self.model.parameters.vector
         y0, dy0, ddy0 = state
-        at = Drive(free[0], free[1], frame, free[2])
+        at = Drive(free[0], free[1], frame, free[2], time)
         both = ca.vertcat(*self.residual(y0, dy0, ddy0, at, ca.SX(1)))
-        in_time = ca.jtimes(both, ca.vertcat(*free[:3]), ca.vertcat(*free[1:]))
-        function = ca.Function("rate_in_time", [*state, *free, frame, p], [in_time], {"cse": True})
-        found = function(y, dy, ddy, drive.no_load, rate, acceleration, jerk, drive.frame, p)
+        in_time = ca.jtimes(both, ca.vertcat(*free[:3], time), ca.vertcat(*free[1:], 1))
+        function = ca.Function("rate_in_time", [*state, *free, frame, time, p], [in_time], {"cse": True})
+        found = function(y, dy, ddy, drive.no_load, rate, acceleration, jerk, drive.frame, drive.time_s, p)
         return found[:-1], found[-1]
 
     def _moment(self, y: ca.SX, dy: ca.SX, drive: Drive) -> ca.SX:
@@ -160,13 +162,13 @@ class BendingChain:
     def forces(
         self, place: Vector, velocity: Vector, cos: ca.SX, sin: ca.SX, frame: ca.SX, kappa: ca.SX
     ) -> Forces:
-        """Return the forces on the links at places and velocities in a frame (x, y, heading) of the room."""
+        """Return the forces on the links at places and velocities in a frame (x, y, heading, time)."""
         x, y, heading = frame[0], frame[1], frame[2]
         c, s = ca.cos(heading), ca.sin(heading)
         dx, dy = turn_by(c, s, *place)
         room_x, room_y = x + dx, y + dy
         v = Chain(*velocity, ca.SX.zeros(self.links, 1))
-        return self.model.forces_on_links(v, cos, sin, room_x, room_y, heading, kappa)
+        return self.model.forces_on_links(v, cos, sin, room_x, room_y, (heading, frame[3]), kappa)
 
     def joint_forces(self, x: ca.SX, y: ca.SX) -> list[Vector]:
         """Return the sums of the links' rows from each link on to the head: entry k from link k + 1."""

@@ -259,7 +259,7 @@ class _Slopes:
 def _force_slopes(chain: BendingChain, m: Motion, y: ca.SX, drive: Drive) -> _Slopes:
     n, theta = chain.links, y[2:]
     r, v, th = ca.SX.sym("r", 2 * n), ca.SX.sym("v", 2 * n), ca.SX.sym("theta", n)
-    frame, p = ca.SX.sym("frame", 3), chain.model.parameters.vector
+    frame, p = ca.SX.sym("frame", 4), chain.model.parameters.vector
     # what friction makes of a bend is left out of the slopes: it is small beside the bending stiffness, and
     # only the steps' matrix asks for them, not the motion
     bend = ca.SX.sym("bend", n - 1)
@@ -270,7 +270,7 @@ def _force_slopes(chain: BendingChain, m: Motion, y: ca.SX, drive: Drive) -> _Sl
     slopes = ca.Function("slopes", [r, v, th, frame, bend, p], [*jacobians, f.x, f.y], {"cse": True})
     place, velocity = ca.vertcat(*m.place), ca.vertcat(*m.velocity)
     f_v, f_r, f_th, p_v, p_r, p_th, f_x, f_y = slopes(
-        place, velocity, theta, drive.frame, chain.chambers(drive).kappa(y), p
+        place, velocity, theta, drive.where_and_when, chain.chambers(drive).kappa(y), p
     )
 
     def block(matrix: ca.SX, i: int) -> ca.SX:

@@ -6,7 +6,7 @@ the curvature is a segment's turn over a length that changes.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import casadi as ca
 
@@ -26,6 +26,12 @@ class Drive:
     no_load_rate: ca.SX
     frame: ca.SX
     no_load_acceleration: ca.SX
+    time_s: ca.SX = field(default_factory=lambda: ca.SX(0))
+
+    @property
+    def where_and_when(self) -> ca.SX:
+        """The frame and the time since the start of the motion, (4,)."""
+        return ca.vertcat(self.frame, self.time_s)
 
 
 @dataclass(frozen=True)

@@ -52,6 +52,8 @@ class Mechanics(ABC):
         Curvatures that the actuators would give without load: the same unless segments bend under load.
     length : SX (N-1, 1)
         The chambers' lengths, m.
+    time : SX
+        Since the start of the motion, s: only forces of effects that are timed know it.
     shape, shape_rate : SX
         The symbols that the places of all points of the body depend on (`StateLayout.shape`), their rates.
     """
@@ -63,6 +65,7 @@ class Mechanics(ABC):
         self.links = n = parameters.structure.links
         self.kappa = ca.SX.sym("kappa", n - 1)
         self.dkappa = ca.SX.sym("dkappa", n - 1)
+        self.time = ca.SX.sym("time")
         self.no_load, self.no_load_rate = self.without_load()
         gap, ratio = p["gap_length_m"], ca.SX(0)
         self.mass = p["link_mass_kg"] * ca.SX.ones(n, 1)
@@ -91,6 +94,11 @@ class Mechanics(ABC):
             return expression
         free = ca.vertcat(self.no_load, self.no_load_rate)
         return ca.substitute(expression, free, ca.vertcat(self.kappa, self.dkappa))
+
+    @property
+    def ages(self) -> bool:
+        """Whether forces depend on the time since the start of the motion."""
+        return any(effect.timed and effect.wheel_factors for effect, _ in self.parameters.effects)
 
     @property
     def stretches(self) -> bool:
@@ -143,7 +151,8 @@ class Mechanics(ABC):
         x, y = turn_by(c, s, chain.x, chain.y)
         room_x, room_y = pose[0] + x, pose[1] + y
         v = self.link_velocities(u_x, u_y, yaw_rate)
-        return self.forces_on_links(v, chain.cos, chain.sin, room_x, room_y, pose[2], self.kappa)
+        frame = pose[2], self.time
+        return self.forces_on_links(v, chain.cos, chain.sin, room_x, room_y, frame, self.kappa)
 
     def forces_on_links(
         self,
@@ -152,15 +161,16 @@ class Mechanics(ABC):
         sin: ca.SX,
         room_x: ca.SX,
         room_y: ca.SX,
-        frame_heading: ca.SX,
+        frame: tuple[ca.SX, ca.SX],
         kappa: ca.SX,
     ) -> Forces:
-        """Return the forces on links that move at `v`, in any frame that stands at `frame_heading`.
+        """Return the forces on links that move at `v`, in any frame.
 
         Friction on link i is -(normal force) [mu_t d_t t + mu_n d_n n] in wheel axes, with the
         smoothed sliding directions d of the robot's friction law (paper, Fig. 2 and Table 1).
         `cos`, `sin` are those of the links' headings in the frame, `room_x`, `room_y` their places in
-        the room (effects of the room ask for them), (N, 1) each; `kappa` (N-1, 1) the curvatures.
+        the room (effects of the room ask for them), (N, 1) each; `frame` its heading in the room and
+        the time; `kappa` (N-1, 1) the curvatures.
         """
         p, n = self.parameters, self.links
         normal = self.normal_force()
@@ -181,7 +191,7 @@ class Mechanics(ABC):
         state = LinkState(
             room_x=room_x,
             room_y=room_y,
-            heading=frame_heading,
+            heading=frame[0],
             v_x=v.x,
             v_y=v.y,
             mass=self.mass,
@@ -192,6 +202,7 @@ class Mechanics(ABC):
             along=v_t,
             across=v_n,
             curvature=bend,
+            time_s=frame[1],
         )
         for effect, e in p.effects:
             if effect.wheel_factors:

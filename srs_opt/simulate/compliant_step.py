@@ -97,7 +97,7 @@ def _stages(
     shapes = {c: actuator.advance(act, valve, c * h) if c else act for c in sorted(set(NODES))}
 
     def drive(at: ActuatorState) -> Drive:
-        return Drive(at.kappa, at.dkappa, pose, actuator.rates(at, valve).dkappa)
+        return Drive(at.kappa, at.dkappa, pose, actuator.rates(at, valve).dkappa, at.time_s)
 
     start = drive(act)
     force, power = chain.residual(y, dy, zero, start, ca.SX(1))

@@ -37,11 +37,12 @@ class _BodyField:
         p = m.parameters.vector
         body = ca.vertcat(pose_rate, rate, power)
         ddkappa = ca.SX.sym("ddkappa", m.links - 1)
-        in_time = ca.jtimes(body, ca.vertcat(m.kappa, m.dkappa), ca.vertcat(m.dkappa, ddkappa))
-        self.value = ca.Function("body", [pose, velocity, *shape, p], [body])
+        moving = ca.vertcat(m.kappa, m.dkappa, m.time)
+        in_time = ca.jtimes(body, moving, ca.vertcat(m.dkappa, ddkappa, 1))
+        self.value = ca.Function("body", [pose, velocity, *shape, m.time, p], [body])
         self.slopes = ca.Function(
             "slopes",
-            [pose, velocity, *shape, ddkappa, p],
+            [pose, velocity, *shape, m.time, ddkappa, p],
             [ca.jacobian(body, pose), ca.jacobian(body, velocity), in_time],
         )
 
@@ -95,7 +96,7 @@ def step_function(structure: Structure) -> ca.Function:
     p = parameters.vector
     rates = actuator.rates(act, valve)
     by_pose, by_velocity, in_time = field.slopes(
-        body[POSE], body[VELOCITY], act.kappa, act.dkappa, rates.dkappa, p
+        body[POSE], body[VELOCITY], act.kappa, act.dkappa, act.time_s, rates.dkappa, p
     )
     solve = _StageSolver(by_pose, by_velocity, h)
     k: list[ca.SX] = []
@@ -106,7 +107,7 @@ def step_function(structure: Structure) -> ca.Function:
         else:
             y = y + k[4]
         shape = shapes[NODES[i]]
-        r = h * field.value(y[POSE], y[VELOCITY], shape.kappa, shape.dkappa, p)
+        r = h * field.value(y[POSE], y[VELOCITY], shape.kappa, shape.dkappa, shape.time_s, p)
         r = r + h * h * TIME_WEIGHTS[i] * in_time
         r = r + sum((c * kj for c, kj in zip(COUPLING[i], k)), ca.SX.zeros(BODY_STATES, 1))
         k.append(solve(r))

@@ -83,6 +83,27 @@ def test_a_dead_time_is_a_late_clock(setting):
     assert np.abs(delayed - shifted).max() < 1e-6
 
 
+def test_a_camera_that_sees_its_markers_one_after_the_other():
+    """Each marker is seen where it is its own lag later; the slope is that of the prediction."""
+    robot, lag_s = wpi_srs(), 0.02
+    time_s = np.arange(40) / 50
+    trials = [
+        Trial(f"t{k}", 1.5, 48.0, 0.4, np.pi / 2, 0.7, 1.0, time_s + k * lag_s,
+              markers_m=np.zeros((time_s.size, robot.links, 2)))
+        for k in range(robot.links)
+    ]  # fmt: skip
+    work = Experiment(Model(robot, generic=True), trials, 0.001).work
+    values, name = start_point(base_coordinates(robot)).values, "generic_camera_rows.lag_s"
+    late = work.predict("t0", Point({**values, name: lag_s})).points
+    for k in range(robot.links):
+        plain = work.predict(f"t{k}", Point(values)).points
+        assert late[:, 2 * k : 2 * k + 2] == pytest.approx(plain[:, 2 * k : 2 * k + 2], abs=2e-5)
+    (size,) = (c for f in work.model.forms for c in f.sizes if c.name == name)
+    slope = work.predict("t0", Point({**values, name: lag_s}), (size,)).jacobian[:, :, 0]
+    ends = [work.predict("t0", Point({**values, name: lag_s + h})).points for h in (1e-3, -1e-3)]
+    assert slope == pytest.approx((ends[0] - ends[1]) / 2e-3, abs=0.02)
+
+
 def test_slopes_of_the_same_place_serve_again_whoever_is_asked(setting, monkeypatch):
     """A place is simulated and derived once; a worker that is handed the memory gives the same bits."""
     robot, coordinates = wpi_srs(), setting[2]

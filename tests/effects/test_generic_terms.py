@@ -32,7 +32,7 @@ def robot_with(*entries):
 
 
 def rate_of(robot, way=1):
-    """Return the rates in a state, or the one with all going the other way; an effect's time is 1 s."""
+    """Return the rates in a state, or the one with all going the other way; an effect's own state is 1/2."""
     structure = Structure.of(robot)
     parameters, m, actuator = build(structure)
     pose, velocity = ca.SX.sym("pose", 3), ca.SX.sym("velocity", 3)
@@ -40,13 +40,14 @@ def rate_of(robot, way=1):
     act = ca.SX.sym("act", actuator.states)
     valve = ca.SX([way, -way, 0, way])
     rates = actuator.rates(actuator.unstack(act), valve).vector()[: 2 * structure.segments]
-    f = ca.Function("f", [pose, velocity, m.kappa, m.dkappa, act, parameters.vector], [rate, rates])
+    inputs = [pose, velocity, m.kappa, m.dkappa, m.time, act, parameters.vector]
+    f = ca.Function("f", inputs, [rate, rates])
     rng = np.random.default_rng(0)
     kappa, dkappa = 10 * rng.standard_normal(4), 20 * rng.standard_normal(4)
-    state = np.ones(actuator.states)
+    state = np.full(actuator.states, 0.5)
     state[:8] = [*kappa, *dkappa]
     moving = [0.2 * way, -0.1 * way, 2e-5]
-    found = f([0.3, 0.2, 0.4], moving, kappa, dkappa, state, parameters.pack(robot, 45.0, 2.0))
+    found = f([0.3, 0.2, 0.4], moving, kappa, dkappa, 1.0, state, parameters.pack(robot, 45.0, 2.0))
     return np.concatenate([np.asarray(v).ravel() for v in found])
 
 
@@ -76,7 +77,7 @@ def generic():
 def test_the_packing_moves_with_every_coordinate(generic, name):
     for form in forms_of(TERMS[name].effect, 5):
         seeds = generic.seeds({}, GAIT, form.sizes)
-        parts = (seeds.p, seeds.camera, seeds.delay_s, seeds.clock_s, seeds.clock_rate)
+        parts = (seeds.p, seeds.camera, seeds.delay_s, seeds.clock_s, seeds.clock_rate, seeds.marker_lag_s)
         assert np.all(sum(np.abs(v).sum(axis=0) for v in parts) > 0)
 
 
@@ -106,6 +107,29 @@ def test_a_wheel_that_rolls_hard_is_as_good_as_a_coefficient_of_its_own():
     entries = [{"name": "generic_along_link", "excess": 1.0, "link": k} for k in range(1, 6)]
     twice = wpi_srs().with_values(friction_tangential=2 * wpi_srs().friction_tangential)
     assert rate_of(robot_with(*entries)) == pytest.approx(rate_of(twice), rel=1e-12)
+
+
+def test_friction_that_grows_with_time_is_a_coefficient_that_does():
+    for name, own in (("along", "friction_tangential"), ("across", "friction_normal")):
+        late = robot_with({"name": f"generic_{name}_time", "per_s": 0.3})  # one second after the start
+        grown = wpi_srs().with_values(**{own: 1.3 * getattr(wpi_srs(), own)})
+        assert rate_of(late) == pytest.approx(rate_of(grown), rel=1e-12)
+
+
+def test_a_late_chamber_gets_the_rest_of_its_pressure_with_its_lag():
+    """All of it: the target after t is 1 - exp(-t/lag) of the pressure's; the other side is in time."""
+    entry = {"name": "generic_lag_left_segment", "ratio": 1.0, "lag_s": 0.05, "segment": 1}
+    robot = robot_with(entry)
+    parameters, _, actuator = build(Structure.of(robot))
+    x, valve, time = ca.SX.sym("x", actuator.states), ca.SX.sym("valve", 4), ca.SX.sym("time")
+    after = actuator.advance(actuator.unstack(x), valve, time)
+    f = ca.Function("f", [x, valve, time, parameters.vector], [after.vector(), actuator.target(valve, after)])
+    p, state = parameters.pack(robot, 50.0, 2.0), np.zeros(actuator.states)
+    whole = robot.curvature_per_pressure_1_m_kpa * 50.0
+    for _ in range(100):
+        state, target = (np.asarray(v).ravel() for v in f(state, np.ones(4), 1e-3, p))
+    assert target == pytest.approx([whole * (1 - np.exp(-2)), whole, whole, whole], rel=1e-6)
+    assert np.asarray(f(state, -np.ones(4), 1e-3, p)[1]).ravel() == pytest.approx(np.full(4, -whole))
 
 
 @pytest.mark.parametrize("name", ["generic_gain_neighbours", "generic_gain_side", "generic_gain_segment"])
