@@ -17,6 +17,7 @@ from srs_opt.discrepancy.examine import examined, linearised, screened_of
 from srs_opt.discrepancy.functions import ResidualFunctions
 from srs_opt.discrepancy.hypothesis import (
     ITERATIONS,
+    LEFT,
     SMALL,
     Hypothesis,
     cost,
@@ -312,14 +313,18 @@ class Search:
     def _refit(self, current: Diagnostics, proposals: list[Score], most: int) -> Hypothesis | None:
         """Refit proposals on the start of a few trials, best first; return the best fit to all of them.
 
-        Once one explains the data, only those that act alike can be its rivals.
+        Once one explains the data, only those that act alike can be its rivals. A body that begins to bend
+        beside other effects is tried last, where nothing else gets on: it has had its chance alone.
         """
         found: list[Hypothesis] = []
         have = current.hypothesis.candidates
         explains: Hypothesis | None = None
         bending = [s for s in proposals if s.candidate.form.effect.bends]
         others = [s for s in proposals if s not in bending][: 2 * most - len(bending)]
-        for score in (*others[:BEFORE_BENDING], *bending, *others[BEFORE_BENDING:]):
+        before = len(others) if have else BEFORE_BENDING
+        for score in (*others[:before], *bending, *others[before:]):
+            if have and score in bending and self._gets_on(found, current):
+                continue
             if explains is not None and not akin(self.examine(explains), score.candidate):
                 continue
             start = self._start(current, score)
@@ -340,6 +345,11 @@ class Search:
         found.sort(key=cost)
         near = [h for h in found if cost(h) < cost(found[0]) + 2 * RIVAL]
         return self._best_of_whole(near)
+
+    def _gets_on(self, found: Sequence[Hypothesis], current: Diagnostics) -> bool:
+        """Whether one of some refits leaves less of the misfit than counts as progress."""
+        without = self._fits.get(fit_key(current.hypothesis.candidates, self.quick != self.trials))
+        return without is not None and any(left_of(without, h) < LEFT for h in found)
 
     def _lost(self, added: Hypothesis, current: Diagnostics) -> bool:
         """Whether a refit ended worse than without the effect that it adds, which it holds at size zero.
