@@ -58,14 +58,17 @@ def signals_not_lost() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def signals_deferred() -> Iterator[None]:
+def signals_deferred() -> Iterator[Callable[[], bool]]:
     """Let Ctrl-C and SIGTERM take effect at the end of the block only.
 
-    For steps of milliseconds that must not be cut in two, such as starting a process and knowing its number.
+    For steps of milliseconds that must not be cut in two, such as starting a process and knowing its number;
+    and for foreign code that can be asked to stop but lets no exception through. What is given tells whether
+    a signal is waiting.
     """
     came: list[Callable[[], None]] = []
-    with _handled(lambda handler, number, frame: came.append(lambda: handler(number, frame))):
-        yield
+    # the frame is let go: it holds what foreign code may have freed by then
+    with _handled(lambda handler, number, frame: came.append(lambda: handler(number, None))):
+        yield lambda: bool(came)
     if came:
         came[0]()
 

@@ -20,6 +20,7 @@ from planners.search.problem import Problem
 from srs_opt import plugins
 from srs_opt.errors import NoAnswerError
 from srs_opt.files import temporary_folder
+from srs_opt.interrupts import signals_deferred, workers_deaf_to_interrupts
 
 T = TypeVar("T")
 QUERY = (
@@ -76,9 +77,10 @@ def in_own_process(call: Callable[..., T], *given: Any, what: str) -> T:
     context = get_context("spawn")
     receiver, sender = context.Pipe(duplex=False)
     process = context.Process(target=_send, args=(sender, plugins.files(), call, given))
-    process.start()
-    sender.close()
     try:
+        with workers_deaf_to_interrupts(), signals_deferred():
+            process.start()
+        sender.close()
         return cast(T, receiver.recv())
     except EOFError:
         raise NoAnswerError(f"{what}: a planner crashed its process") from None

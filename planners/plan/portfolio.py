@@ -24,7 +24,7 @@ from planners.plan.solve import BEAM, TOO_NARROW, LatticeSolver
 from planners.search.ompl_setup import MISSING, has_ompl
 from planners.search.problem import Problem
 from srs_opt import plugins
-from srs_opt.interrupts import workers_deaf_to_interrupts
+from srs_opt.interrupts import signals_deferred, workers_deaf_to_interrupts
 
 FIRST_NODES = 3000  # cycles that our searches look at in the first round; doubled every round
 FIRST_ITERATIONS = 1000  # of another planner
@@ -107,7 +107,7 @@ def _ompl_round(problem: Problem, request: PlanRequest, iterations: int, left_s:
     deadline = time.perf_counter() + left_s
     with ExitStack() as processes:  # one each: a planner that crashes takes no other with it
         pools = [processes.enter_context(_worker()) for _ in OMPLS]
-        with workers_deaf_to_interrupts():
+        with workers_deaf_to_interrupts(), signals_deferred():
             futures = [
                 pool.submit(found_apart, problem, name, iterations, request.seed)
                 for pool, name in zip(pools, OMPLS)
@@ -154,7 +154,7 @@ def _found(
         ends = time.perf_counter() + left_s
         return planner.find(problem, Effort(iterations, seed, lambda: time.perf_counter() > ends))
     with _worker() as pool:
-        with workers_deaf_to_interrupts():
+        with workers_deaf_to_interrupts(), signals_deferred():
             future = pool.submit(found_apart, problem, planner.name, iterations, seed)
         return _result(future, left_s)
 

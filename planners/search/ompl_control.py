@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from planners.search.ompl_problem import CycleSetup, cycle_setup, gaits_of, path_of
-from planners.search.ompl_setup import counted, seeded
+from planners.search.ompl_setup import counted, seeded, until_a_signal
 from planners.search.problem import Problem
 
 MakePlanner = Callable[[Any], Any]  # from a SpaceInformation
@@ -27,13 +27,17 @@ def run_planner(problem: Problem, make: MakePlanner, iterations: int, seed: int)
         After how many the planner gives up.
     seed : int
     """
-    seeded(seed)
-    setup = cycle_setup(problem).setup
-    planner = make(setup.getSpaceInformation())
-    setup.setPlanner(planner)
-    setup.setup()
-    setup.solve(counted(iterations))
-    return gaits_of(problem, setup.getSolutionPath()) if setup.haveExactSolutionPath() else None
+
+    def found(stop: Callable[[], bool]) -> tuple[int, ...] | None:
+        seeded(seed)
+        setup = cycle_setup(problem).setup
+        planner = make(setup.getSpaceInformation())
+        setup.setPlanner(planner)
+        setup.setup()
+        setup.solve(counted(iterations, stop))
+        return gaits_of(problem, setup.getSolutionPath()) if setup.haveExactSolutionPath() else None
+
+    return until_a_signal(found)
 
 
 def as_ompl_planner(

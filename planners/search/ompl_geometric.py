@@ -7,6 +7,7 @@ the path is worth is seen when the dynamic model follows it, and in the certific
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planners.search.follow import follow, reference_along
-from planners.search.ompl_setup import counted, seeded
+from planners.search.ompl_setup import counted, seeded, until_a_signal
 from planners.search.problem import Problem
 from planners.search.tree import Step
 
@@ -90,18 +91,21 @@ def geometric_path(
     """Return the poses (n, 3) of a path that the strip can follow, or None."""
     from ompl import geometric
 
-    seeded(seed)
-    setup = strip_setup(problem, kind, curves)
-    info = setup.getSpaceInformation()
-    setup.setPlanner(getattr(geometric, method)(info))
-    setup.setup()
-    setup.solve(counted(iterations, setup.haveExactSolutionPath))
-    if not setup.haveExactSolutionPath():
-        return None
-    path = setup.getSolutionPath()
-    # the simplifier's rounds are counted, not timed
-    geometric.PathSimplifier(info).reduceVertices(path, 50, 50, 0.5)
-    return poses_along(path, STEP * problem.robot.length_m)
+    def found(stop: Callable[[], bool]) -> Array | None:
+        seeded(seed)
+        setup = strip_setup(problem, kind, curves)
+        info = setup.getSpaceInformation()
+        setup.setPlanner(getattr(geometric, method)(info))
+        setup.setup()
+        setup.solve(counted(iterations, lambda: stop() or setup.haveExactSolutionPath()))
+        if not setup.haveExactSolutionPath():
+            return None
+        path = setup.getSolutionPath()
+        # the simplifier's rounds are counted, not timed
+        geometric.PathSimplifier(info).reduceVertices(path, 50, 50, 0.5)
+        return poses_along(path, STEP * problem.robot.length_m)
+
+    return until_a_signal(found)
 
 
 def strip_setup(problem: Problem, kind: str, curves: Curves) -> Any:

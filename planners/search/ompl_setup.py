@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar
 
 from srs_opt.errors import InputError
+from srs_opt.interrupts import signals_deferred
 
+T = TypeVar("T")
 MISSING = "OMPL is not installed here (it has no wheel for Windows and older macOS)"
 
 
@@ -77,3 +79,13 @@ def counted(iterations: int, done: Callable[[], bool] = lambda: False) -> Any:
         return asked > iterations or done()
 
     return base.PlannerTerminationCondition(stop)
+
+
+def until_a_signal(call: Callable[[Callable[[], bool]], T]) -> T:
+    """Return what a call returns that is told when to stop: at a signal as well.
+
+    Ctrl-C and SIGTERM take effect when the call has returned: OMPL's C++ lets exceptions out of Python's
+    callbacks late, or never, and its objects do not outlive each other in the order of a traceback.
+    """
+    with signals_deferred() as waiting:
+        return call(waiting)
