@@ -1,4 +1,4 @@
-"""The robot that is driven, in another physics engine: what it touches, it touches there."""
+"""The driven robot in another physics engine, walls included."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""What room the body will have, simulated with the friction and stiffness that the robot seems to have.
+"""The clearance to expect, simulated with every friction and stiffness that fits what was seen.
 
 Whatever slows a robot down or lets it slide is seen as friction, whatever yields as stiffness: after every
-cycle, those suspects stay possible that would have led near to where the robot is. What the driver thinks of
-doing is looked at with all of them.
+cycle, those members of the ensemble stay possible that predict a place near the measured one. What the driver
+may do next is simulated with all of them.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Coming to rest: vent at once, or brake with another gait for a cycle first, whatever leaves more room.
 
-A vented body straightens while it rolls on, and near a wall that may be the one thing that touches it.
+A vented body straightens while it rolls on, which may be what touches a nearby wall.
 """
 
 from __future__ import annotations

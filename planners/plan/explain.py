@@ -1,4 +1,4 @@
-"""Why there is no way: the tightest place on the widest route, its width, and what every gait needs there."""
+"""Why no plan exists: the tightest place on the widest route, its width, and what every gait needs there."""
 
 from __future__ import annotations
 

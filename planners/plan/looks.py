@@ -1,6 +1,6 @@
 """What holds of a plan between two looks of a camera, and for how long it holds without any.
 
-A plan of 90 m is certified as a motion of the model, but a start that is measured 5 mrad askew ends half a
+A plan of 90 m is certified as a motion of the model, but a start heading measured 5 mrad off ends half a
 metre beside it. So two more things are certified, for every state within the tolerance of a look. Driven
 closed-loop, the robot is measured where a cycle begins and the body keeps clear until the next one begins.
 Driven open-loop, it is measured once, at the start.

@@ -2,7 +2,7 @@
 
 A plain search takes a `Problem` and an `Effort` and returns the gaits of a way, a cycle each. For OMPL every
 planner is an `ompl.base.Planner` on the set-up of `planners.search.ompl_problem`: OMPL's own as they are,
-plain searches through an adapter. The certificate is no planner's business.
+plain searches through an adapter. Planners do not make certificates.
 
 Examples
 --------

@@ -2,7 +2,7 @@
 
 Not complete, but its plans are faster than those that the best-first search finds as soon: states after
 the same number of cycles are compared by the time that they have taken and the time that they need, so
-nothing has to be greedy. Where the beam dies the best-first search takes over.
+nothing has to be greedy. Where no state of the beam can go on, the best-first search takes over.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Is the whole body clear of the walls: by table where that decides, else by exact geometry."""
+"""Clearance of the whole body from the walls: by distance field where that decides, else exactly."""
 
 from __future__ import annotations
 

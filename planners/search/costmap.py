@@ -1,4 +1,4 @@
-"""How long from here to the goal: Dijkstra over a grid, slower where only slim gaits fit."""
+"""Time to the goal from every place: Dijkstra on a grid, with lower speeds where only slim gaits fit."""
 
 from __future__ import annotations
 

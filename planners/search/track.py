@@ -1,4 +1,4 @@
-"""Which gait next: a few cycles are rolled out over the gait table, the best first one is played.
+"""Receding-horizon choice of the next gait: a few cycles are rolled out over the gait table.
 
 The predictor learns as it drives: how much farther or shorter than predicted a cycle goes, and how much
 the robot turns by itself. That is what a robot with other friction, a tether or a bent segment shows.

@@ -1,4 +1,4 @@
-"""Trials that stand apart: a wrong entry, another robot. Found by leaving them out of the fit."""
+"""Outlying trials (a wrong entry, another robot), found by leaving them out of the fit."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Positions that are no noise: labels that were exchanged are put right, what lies far off is left out.
+"""Outlying positions: exchanged labels are put right, and what lies far off is left out.
 
 Both are judged by the tracks alone, not by a model's residuals: what a model cannot explain stays.
 """

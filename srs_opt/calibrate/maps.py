@@ -1,4 +1,4 @@
-"""Calibration from maps alone: speeds and curvatures of steady gaits' paths, which know less than tracks."""
+"""Calibration from maps alone: speeds and curvatures of steady gaits' paths, which tell less than tracks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How large the smooth errors are that no effect explains: drift, and what repeats with the gait.
+"""Size of the smooth errors that no effect explains: drift, and errors that repeat with the gait.
 
 Their variances are estimated by restricted maximum likelihood from normal equations in which the amplitudes
 of every trial are still columns, with everything that the model could lack free to follow: an effect is

@@ -1,4 +1,4 @@
-"""Gait tables of one robot, of several, or of one whose stiffness is not known: whom they serve, how made."""
+"""Gait tables of one robot, of several, or of one whose stiffness is not known."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The certificate: the finished gait simulated switch-exactly, with nothing of the optimizer's in it."""
+"""The certificate: the final gait simulated with exact switch times, independent of the optimizer."""
 
 from __future__ import annotations
 

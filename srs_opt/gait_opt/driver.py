@@ -1,6 +1,6 @@
-"""Slow gaits and pivots for a driver: waves bred by simulation until they move as is wanted.
+"""Slow gaits and pivots for a driver: waves evolved by simulation until they move as wanted.
 
-The planner has no use for them: it lives on the fastest gaits for every radius and band. Somebody who drives
+The planner does not use them: it needs the fastest gaits for every radius and band. A person who drives
 by speed and turn rate needs what lies between these and standing still. There nothing is optimal, so there is
 nothing to collocate: any certified gait near the wanted motion will do, the slimmer the better.
 """

@@ -1,4 +1,4 @@
-"""Gait tables for people: CSV. What controllers get: `srs_opt.controller`."""
+"""Gait tables as CSV. For controllers see `srs_opt.controller`."""
 
 from __future__ import annotations
 

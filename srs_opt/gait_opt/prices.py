@@ -1,4 +1,4 @@
-"""What limits cost: the multipliers of those that are active at an optimum, in units that mean something."""
+"""Sensitivity of the optimum to its active limits: their multipliers, in physical units."""
 
 from __future__ import annotations
 

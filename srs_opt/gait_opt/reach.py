@@ -1,4 +1,4 @@
-"""What no gait can keep: limits that contradict each other, told from the closed form before any search."""
+"""Limits that no gait can keep, found from the closed-form curvature before any search."""
 
 from __future__ import annotations
 

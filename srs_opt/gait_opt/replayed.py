@@ -1,4 +1,4 @@
-"""A table's gaits on another robot: the same valves, the motion that this robot makes of them."""
+"""A table's gaits on another robot: the same valve timing, with that robot's motion."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a gait that was found for a rigid body makes of a soft one."""
+"""How a gait that was found for a rigid body moves a soft one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Waves that change on the way, bred by simulation (CMA-ES): starts that no steady wave leads to.
+"""Waves that change on the way, evolved by simulation (CMA-ES): starts that no steady wave leads to.
 
 A standing start wants a frequency that rises with the speed, from about 1 to 3.5 Hz, and lags that fall: from
 a steady wave that is a move of every switch by up to a cycle, which no local step makes. So a wave of the

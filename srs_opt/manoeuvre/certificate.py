@@ -1,4 +1,4 @@
-"""The certificate of a manoeuvre: simulated afresh, adaptively, with two tolerances; every wish checked."""
+"""The certificate of a manoeuvre: simulated afresh, adaptively, with two tolerances; all of it checked."""
 
 from __future__ import annotations
 

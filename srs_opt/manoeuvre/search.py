@@ -1,4 +1,4 @@
-"""A manoeuvre from nothing: starts, local optima from soft to own friction, perturbed optima, ticks."""
+"""The whole search for a manoeuvre: starts, local optima with friction ever less smoothed, ticks."""
 
 from __future__ import annotations
 

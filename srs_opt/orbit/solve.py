@@ -3,7 +3,7 @@
 The actuators' periodic state is known first (closed form where they are linear), so only the dynamic states
 at the start of the cycle are unknown: the body's three velocities, and in the compliant model the bends and
 their rates. Their monodromy matrix is carried through the period with the exact derivative of every
-integration step; for the compliant model's many by differences a hair wide, on the same mesh.
+integration step; for the compliant model's many by finite differences, on the same mesh.
 
 A soft body can have several stable orbits under one gait, so there the orbit is the one that is reached from
 rest: the motion is simulated until it has all but settled, and Newton only finishes it.

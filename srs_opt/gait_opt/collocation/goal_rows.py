@@ -1,4 +1,4 @@
-"""The rows of the program that speak of the gait as a whole: wishes, dwell times, merit, own constraints."""
+"""The program's rows for the gait as a whole: targets, dwell times, merit, own constraints."""
 
 from __future__ import annotations
 
