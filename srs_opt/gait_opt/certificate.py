@@ -19,6 +19,8 @@ from srs_opt.gait_opt.goal import (
     Limits,
 )
 from srs_opt.gait_opt.score import broken_constraints, evaluated, robot_scores
+from srs_opt.geometry import distance_along
+from srs_opt.model.state import FORWARD, SIDEWAYS, YAW_MOMENTUM
 from srs_opt.orbit.attractors import other_orbits
 from srs_opt.orbit.body import body_over_cycle, integrator
 from srs_opt.orbit.steady import Orbit, steady_gait
@@ -28,13 +30,40 @@ from srs_opt.simulate.rosenbrock import VELOCITY
 from srs_opt.simulate.run import motion_of_cycle
 from srs_opt.simulate.timeline import Timeline
 
-CYCLES = 50
-SPEED_ERROR = 0.005  # collocation against simulation
-SPEED_FLOOR_M_S = 5e-4  # of that difference, for gaits that hardly move
-GAP = 1e-3  # change of the motion over CYCLES cycles, over its size
-STANDING_START = 0.01  # speed of the last of CYCLES cycles from rest against the steady one
-LIMIT_EXCESS = 0.01
-CONSTRAINT_EXCESS = 0.01  # of an objective's own constraints
+
+@dataclass(frozen=True)
+class CertificateSettings:
+    """When a gait counts as certified.
+
+    Attributes
+    ----------
+    cycles : int
+        Simulated for the periodicity gap and for the start from rest. Fewer would refuse gaits that
+        accelerate slowly; more only take time.
+    speed_error : float
+        Of the simulated speed: up to which the optimizer's may differ. Smaller, gaits are refused for the
+        error of their mesh; larger, collocated orbits pass that are not the simulated one.
+    speed_floor : float
+        Of that difference, for gaits that hardly move: body lengths per second.
+    gap : float
+        Change of velocity and shape over `cycles`, over their size. What integration leaves is smaller.
+    standing_start : float
+        Of the steady speed: up to which the last of `cycles` cycles from rest may differ.
+    limit_excess, constraint_excess : float
+        Of a limit (band, curvature), and of an objective's own constraint: by which it may be exceeded after
+        switches are rounded to ticks, which moves them by half a tick.
+    """
+
+    cycles: int = 50
+    speed_error: float = 0.005
+    speed_floor: float = 0.00212
+    gap: float = 1e-3
+    standing_start: float = 0.01
+    limit_excess: float = 0.01
+    constraint_excess: float = 0.01
+
+
+DEFAULT_CERTIFICATE = CertificateSettings()
 
 
 @dataclass(frozen=True)
@@ -106,7 +135,7 @@ class Certificate:
     robots : tuple of RobotCertificate
         The nominal one first.
     worst : int
-        The robot that serves the goal worst: its wishes missed most or, none missed, its merit lowest.
+        The robot that serves the goal worst: its targets missed most or, none missed, its merit lowest.
     dwell_ok : bool
     switches_per_s : float
     common : tuple of str
@@ -163,7 +192,10 @@ class Certificate:
 
 
 def certify(
-    problem: CycleProblem, gait: Gait, claimed_m_s: tuple[float, ...]
+    problem: CycleProblem,
+    gait: Gait,
+    claimed_m_s: tuple[float, ...],
+    settings: CertificateSettings = DEFAULT_CERTIFICATE,
 ) -> tuple[Certificate, tuple[Orbit, ...]]:
     """Return the certificate of a gait that stands on the controller's ticks, and its orbits per robot.
 
@@ -176,37 +208,43 @@ def certify(
     if not dwell_ok:
         common.append(f"a valve holds for {dwell:.4f} s, shorter than {problem.limits.min_dwell_s:.4f} s")
     common += _ranges_left(problem.limits, gait)
-    robots = tuple(_certified(problem, gait, r, o, claimed_m_s[r]) for r, o in enumerate(orbits))
+    robots = tuple(_certified(problem, gait, r, o, claimed_m_s[r], settings) for r, o in enumerate(orbits))
     scores = robot_scores(problem, gait, orbits)
     worst = min(range(len(robots)), key=lambda r: (not robots[r].failures, scores[r].total))
     return Certificate(robots, worst, dwell_ok, gait.switches_per_s, tuple(common)), orbits
 
 
 def _certified(
-    problem: CycleProblem, gait: Gait, index: int, orbit: Orbit, claimed_m_s: float
+    problem: CycleProblem,
+    gait: Gait,
+    index: int,
+    orbit: Orbit,
+    claimed_m_s: float,
+    settings: CertificateSettings,
 ) -> RobotCertificate:
     robot = problem.robots[index]
     speed, largest = orbit.speed_m_s, orbit.largest_multiplier
-    gap = periodicity_gap(robot, gait, problem.model, orbit)
-    standing = standing_start(robot, gait, problem.model)
+    cycles, floor_m_s = settings.cycles, settings.speed_floor * robot.length_m
+    gap = periodicity_gap(robot, gait, problem.model, orbit, cycles)
+    standing = standing_start(robot, gait, problem.model, cycles)
     failures = []
-    if abs(claimed_m_s - speed) > max(SPEED_ERROR * abs(speed), SPEED_FLOOR_M_S):
+    if abs(claimed_m_s - speed) > max(settings.speed_error * abs(speed), floor_m_s):
         failures.append(f"simulated speed {speed:.4f} m/s, the optimizer's {claimed_m_s:.4f} m/s")
-    if gap > GAP:
-        failures.append(f"after {CYCLES} cycles the motion has changed by {gap:.2g} of its size")
-    if abs(standing - speed) > max(STANDING_START * abs(speed), SPEED_FLOOR_M_S):
+    if gap > settings.gap:
+        failures.append(f"after {cycles} cycles the motion has changed by {gap:.2g} of its size")
+    if abs(standing - speed) > max(settings.standing_start * abs(speed), floor_m_s):
         failures.append(
-            f"{CYCLES} cycles from rest end at {standing:.4f} m/s, the steady gait has {speed:.4f}"
+            f"{cycles} cycles from rest end at {standing:.4f} m/s, the steady gait has {speed:.4f}"
         )
     if largest >= 1:
         failures.append(f"the gait is unstable: largest Floquet multiplier {largest:.3f}")
-    failures += _curvature_exceeded(problem.limits, orbit)
-    failures += _wishes_missed(problem.goal, orbit)
+    failures += _curvature_exceeded(problem.limits, orbit, settings)
+    failures += _targets_missed(problem.goal, orbit, settings)
     _, rows = evaluated(problem, problem.goal.aim, gait, index, orbit)
     failures += [
         f"constraint {name} is missed by {over:.4g}"
         for name, over in broken_constraints(problem, rows)
-        if not over <= CONSTRAINT_EXCESS
+        if not over <= settings.constraint_excess
     ]
     if (room := self_clearance_m(robot, orbit, problem.model)) < 0:
         failures.append(f"the body overlaps itself by {-1e3 * room:.1f} mm")
@@ -217,7 +255,7 @@ def _certified(
     )  # fmt: skip
 
 
-def standing_start(robot: Robot, gait: Gait, model: str, cycles: int = CYCLES) -> float:
+def standing_start(robot: Robot, gait: Gait, model: str, cycles: int = DEFAULT_CERTIFICATE.cycles) -> float:
     """Return the mean speed (m/s) over the last of `cycles` cycles from rest."""
     run = _undelayed(robot, model)
     path = run.integrate(Timeline.of_gait(gait, cycles * gait.period_s), run.rest())
@@ -230,7 +268,9 @@ def _undelayed(robot: Robot, model: str) -> Integrator:
     return integrator(replace(robot, valve_delay_s=0.0, effects=own), model)
 
 
-def periodicity_gap(robot: Robot, gait: Gait, model: str, orbit: Orbit, cycles: int = CYCLES) -> float:
+def periodicity_gap(
+    robot: Robot, gait: Gait, model: str, orbit: Orbit, cycles: int = DEFAULT_CERTIFICATE.cycles
+) -> float:
     """Return by how much velocity and shape change over simulated cycles, relative to their size."""
     start = orbit.solution.start
     run = _undelayed(robot, model)
@@ -239,7 +279,7 @@ def periodicity_gap(robot: Robot, gait: Gait, model: str, orbit: Orbit, cycles: 
     speeds = orbit.solution.states[VELOCITY]
     momentum = np.abs(speeds[2]).max() or 1.0
     size = max(np.abs(speeds[:2]).max(), 1e-6)
-    body = max(change[3], change[4]) / size, change[5] / momentum
+    body = max(change[FORWARD], change[SIDEWAYS]) / size, change[YAW_MOMENTUM] / momentum
     shape = change[run.layout.kappa].max() / max(np.abs(orbit.kappa).max(), 1e-9)
     return float(max(*body, shape))
 
@@ -255,20 +295,20 @@ def _ranges_left(limits: Limits, gait: Gait) -> list[str]:
     ]
 
 
-def _curvature_exceeded(limits: Limits, orbit: Orbit) -> list[str]:
+def _curvature_exceeded(limits: Limits, orbit: Orbit, settings: CertificateSettings) -> list[str]:
     most, bend = limits.max_curvature_1_m, float(np.abs(orbit.kappa).max())
-    if most is None or bend <= most * (1 + LIMIT_EXCESS):
+    if most is None or bend <= most * (1 + settings.limit_excess):
         return []
     return [f"curvature reaches {bend:.2f} 1/m, limit {most:g}"]
 
 
-def _wishes_missed(goal: Goal, orbit: Orbit) -> list[str]:
+def _targets_missed(goal: Goal, orbit: Orbit, settings: CertificateSettings) -> list[str]:
     missed = []
     floor = goal.floor_m_s
-    if goal.envelope_m is not None and sum(orbit.envelope_m) > goal.envelope_m * (1 + LIMIT_EXCESS):
+    if goal.envelope_m is not None and sum(orbit.envelope_m) > goal.envelope_m * (1 + settings.limit_excess):
         missed.append(f"the swept band is {sum(orbit.envelope_m):.4f} m wide, limit {goal.envelope_m:g} m")
     missed += _turn_missed(goal, orbit)
-    if floor is not None and orbit.speed_m_s < floor * (1 - SPEED_ERROR * 2):
+    if floor is not None and orbit.speed_m_s < floor * (1 - settings.speed_error * 2):
         wanted = "wanted" if goal.speed_m_s else "least"
         missed.append(f"{wanted} speed {floor:g} m/s, simulated {orbit.speed_m_s:.4f} m/s")
     return missed
@@ -296,7 +336,7 @@ def self_clearance_m(robot: Robot, orbit: Orbit, model: str | None = None) -> fl
     """Return the room between parts of the body that are not neighbours, over a cycle (negative: overlap)."""
     run = integrator(robot, model)
     _, _, x, y = body_over_cycle(run, orbit.time_s, orbit.pose, orbit.kappa)
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x[:, 0]), np.diff(y[:, 0])))])
+    along = distance_along(np.stack([x[:, 0], y[:, 0]], axis=1))
     apart = np.abs(along[:, None] - along[None]) > 1.6 * robot.body_width_m  # half a turn of its own width
     if not apart.any():
         return float("inf")

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from srs_opt.gait import Gait
-from srs_opt.gait_opt.certificate import STANDING_START, standing_start
+from srs_opt.gait_opt.certificate import DEFAULT_CERTIFICATE, standing_start
 from srs_opt.gait_opt.collocation.problem import CycleProblem
 from srs_opt.gait_opt.continuation import Step, orbits_of
 from srs_opt.gait_opt.corrections import on_ticks
@@ -103,6 +103,7 @@ def search_from_rest(problem: CycleProblem, gait: Gait, seed: int = 0) -> FromRe
 def _stands(problem: CycleProblem, gait: Gait) -> bool:
     """Whether a standing start comes to the steady motion on every robot, as the certificate will ask."""
     return all(
-        abs(standing_start(robot, gait, problem.model) - orbit.speed_m_s) < STANDING_START * orbit.speed_m_s
+        abs(standing_start(robot, gait, problem.model) - orbit.speed_m_s)
+        < DEFAULT_CERTIFICATE.standing_start * orbit.speed_m_s
         for robot, orbit in zip(problem.robots, orbits_of(problem, gait))
     )
