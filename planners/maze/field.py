@@ -61,9 +61,8 @@ class DistanceField:
         )
         if beyond:
             u, v = u.clip(0.0, columns - 1), v.clip(0.0, rows - 1)
-        i, j = v.astype(np.int64), u.astype(np.int64)
-        np.minimum(i, max(rows - 2, 0), out=i)
-        np.minimum(j, max(columns - 2, 0), out=j)
+        i = np.minimum(v.astype(np.int64), max(rows - 2, 0))
+        j = np.minimum(u.astype(np.int64), max(columns - 2, 0))
         du, dv = u - j, v - i
         up, right = min(1, rows - 1), min(1, columns - 1)
         node, flat = i * columns + j, self.values.ravel()  # one index each: half the time of two

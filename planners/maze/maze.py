@@ -91,7 +91,11 @@ class Maze:
 
     def point_clearances(self, points: ArrayLike) -> NDArray[np.float64]:
         """Return the exact distance in metres of `points`, shape (n, 2), to the nearest wall."""
-        return self.clearances(shapely.points(np.asarray(points, dtype=float).reshape(-1, 2)))
+        xy = np.asarray(points, dtype=float).reshape(-1, 2)
+        low, high = np.array(self.bounds[:2]), np.array(self.bounds[2:])
+        nearest = np.maximum(np.minimum(xy - low, high - xy).min(axis=1, initial=math.inf), 0.0)
+        nearest = np.minimum(nearest, self.walls.distance(shapely.points(xy), nearest))
+        return nearest if self.raster is None else self.raster.point_distances(xy, nearest)
 
     def inside_bounds(self, x: float, y: float) -> bool:
         """Whether the point lies within the bounds (metres)."""

@@ -20,6 +20,7 @@ MAX_CELLS = 64_000_000
 """Larger grids are refused: 8000 x 8000 cells."""
 
 _CELLS_AT_ONCE = 1_000_000
+_REACH = 16  # cells about a point that are looked at without a search
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,6 +92,40 @@ class Raster:
                 return min(found, limit_m)
             # a cell was seen beyond the window's reach: only nearer ones can still matter
             reach = min(found, 2 * reach, limit_m)
+
+    def point_distances(
+        self, points: NDArray[np.float64], limit_m: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return the exact distance of points (n, 2) to the nearest occupied cell, at most `limit_m` (n,).
+
+        All points look at the cells about their own together, and then those at twice as many whose nearest
+        may lie farther away; points far from everything look on by themselves.
+        """
+        at = self.to_grid(np.asarray(points, dtype=float)) / self.cell_m
+        home, nearest = np.floor(at).astype(np.int64), limit_m / self.cell_m
+        open_still, reach = np.arange(len(at)), 1
+        while open_still.size and reach <= _REACH:
+            many = max(1, _CELLS_AT_ONCE // (2 * reach + 1) ** 2)
+            for first in range(0, open_still.size, many):
+                some = open_still[first : first + many]
+                nearest[some] = np.minimum(nearest[some], self._among(at[some], home[some], reach))
+            open_still = open_still[nearest[open_still] > reach]
+            reach *= 2
+        found = np.asarray(np.minimum(nearest * self.cell_m, limit_m))
+        for index in open_still:
+            found[index] = self.distance(shapely.Point(points[index]), float(found[index]))
+        return found
+
+    def _among(self, at: NDArray[np.float64], home: NDArray[np.int64], reach: int) -> NDArray[np.float64]:
+        """Return the distance (n,), in cells, of points to the nearest occupied cell up to `reach` off."""
+        cells = home[:, :, None] + np.arange(-reach, reach + 1)
+        gap = np.maximum(np.maximum(cells - at[:, :, None], at[:, :, None] - cells - 1), 0.0) ** 2
+        rows, columns = self.occupied.shape
+        (column, row), inside = cells.transpose(1, 0, 2), (cells >= 0) & (cells < [[columns], [rows]])
+        occupied = self.occupied[row.clip(0, rows - 1)[:, :, None], column.clip(0, columns - 1)[:, None, :]]
+        occupied = occupied & inside[:, 1, :, None] & inside[:, 0, None, :]
+        squared = np.where(occupied, gap[:, 1, :, None] + gap[:, 0, None, :], np.inf)
+        return np.asarray(np.sqrt(squared.min(axis=(1, 2))))
 
     def _window(self, box: Box, reach: float) -> tuple[slice, slice]:
         rows, columns = self.occupied.shape

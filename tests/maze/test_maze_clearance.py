@@ -181,3 +181,20 @@ def test_goal_disc_boxes_and_heading():
     cells = Goal.of_boxes(((0, 0, 1, 1), (1, 0, 2, 1)))
     assert (cells.x, cells.y) == (1.0, 0.5)
     np.testing.assert_allclose(cells.distance([(0.5, 0.5), (2.3, 1.4), (-1, 0.5)]), [0, 0.5, 1])
+
+
+@pytest.mark.parametrize("heading", [0.0, 0.7])
+@pytest.mark.parametrize("share", [0.0, 0.002, 0.3])
+def test_points_of_a_grid(heading, share):
+    """As far as shapely says they are from the union of the cells and from the bounds."""
+    rng = np.random.default_rng(3)
+    raster = Raster(rng.random((40, 60)) < share, 0.05, Pose(0.4, -0.3, heading))
+    maze = Maze("grid", raster.bounds(), raster=raster)
+    points = rng.uniform(raster.bounds()[:2], raster.bounds()[2:], (300, 2))
+    cells = np.argwhere(raster.occupied)[:, ::-1] * raster.cell_m
+    corners = cells[:, None] + raster.cell_m * np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+    solid = shapely.union_all(shapely.polygons(raster.to_world(corners)))
+    wanted = shapely.distance(shapely.box(*maze.bounds).exterior, shapely.points(points))
+    if share:
+        wanted = np.minimum(wanted, shapely.distance(solid, shapely.points(points)))
+    np.testing.assert_allclose(maze.point_clearances(points), wanted, atol=1e-9)
