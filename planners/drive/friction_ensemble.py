@@ -8,6 +8,7 @@ may do next is simulated with all of them.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,21 +28,57 @@ from srs_opt.simulate.timeline import Timeline
 
 Array = NDArray[np.float64]
 Cycle = tuple[int, int]  # gait before, gait
-# friction along and across the wheels, over the planned robot's; a hose that drags is felt along the wheels
-FRICTIONS = ((1.0, 1.0), (0.8, 0.8), (1.2, 1.2), (0.8, 1.0), (1.25, 1.0), (1.5, 1.0), (2.0, 1.0))
-# bending stiffness over the planned one of a soft robot whose file gives no deviation; N m^2 for a rigid plan
-# (a silicone segment of the built-in robot's size has 0.002 to 0.02)
-STIFFNESS_TIMES = (0.5, 2.0)
-STIFFNESSES_N_M2 = (0.0025, 0.005, 0.012)
-# a body that yields though the plan says rigid is suspected only when no friction explains what was seen: it
-# begins with this squared miss. With 0 sound robots are driven as carefully as soft ones
-UNLIKELY = 1.5
-FADING = 0.7  # of what earlier cycles told, per cycle
-# misses of place (body lengths), heading (rad) and speed (body lengths per second) that weigh alike
-SCALES = (0.0424, 0.0424, 0.05, 0.212)
-# a friction is thought possible up to this squared miss, and so many times the least one
-PLAUSIBLE, TIMES = 1.0, 3.0
-ENOUGH_MARGINS = 0.5  # of the margin: what leaves so much room is good enough
+
+
+@dataclass(frozen=True)
+class EnsembleSettings:
+    """Which frictions and stiffnesses a robot may have, and when one is thought possible.
+
+    Attributes
+    ----------
+    frictions : tuple of (along, across)
+        Over the planned robot's. A dragging hose acts along the wheels. Each one costs a simulation per cycle
+        and per gait that is looked at.
+    stiffness_times : tuple of float
+        Bending stiffness over the planned one, of a soft robot whose file gives no deviation.
+    stiffnesses_n_m2 : tuple of float
+        Bending stiffnesses under a rigid plan: a silicone segment of the built-in robot's size has 0.002 to
+        0.02.
+    unlikely : float
+        Squared miss with which they begin there: a body that yields though the plan says rigid is suspected
+        only when no friction explains what was seen. With 0, sound robots are driven
+        as carefully as soft ones.
+    fading : float
+        Share of what earlier cycles told that is kept, per cycle: half of it is forgotten after two.
+    scales : tuple of float
+        Misses of place (body lengths), heading (rad) and speed (body lengths per second) that weigh alike.
+    plausible, times : float
+        A member is thought possible up to this squared miss, and so many times the least one. Larger values
+        keep more members, and with them more room from walls.
+    enough_margins : float
+        Of the margin: what leaves so much room with every possible member is good enough.
+    """
+
+    frictions: tuple[tuple[float, float], ...] = (
+        (1.0, 1.0),
+        (0.8, 0.8),
+        (1.2, 1.2),
+        (0.8, 1.0),
+        (1.25, 1.0),
+        (1.5, 1.0),
+        (2.0, 1.0),
+    )
+    stiffness_times: tuple[float, ...] = (0.5, 2.0)
+    stiffnesses_n_m2: tuple[float, ...] = (0.0025, 0.005, 0.012)
+    unlikely: float = 1.5
+    fading: float = 0.7
+    scales: tuple[float, float, float, float] = (0.0424, 0.0424, 0.05, 0.212)
+    plausible: float = 1.0
+    times: float = 3.0
+    enough_margins: float = 0.5
+
+
+DEFAULT_ENSEMBLE = EnsembleSettings()
 
 
 class FrictionEnsemble:
@@ -50,21 +87,24 @@ class FrictionEnsemble:
     Parameters
     ----------
     problem : Problem
+    settings : EnsembleSettings, optional
     """
 
-    def __init__(self, problem: Problem) -> None:
-        self.problem = problem
+    def __init__(self, problem: Problem, settings: EnsembleSettings = DEFAULT_ENSEMBLE) -> None:
+        self.problem, self.settings = problem, settings
         robot = problem.robot
-        self._scales = np.array(SCALES) * (robot.length_m, robot.length_m, 1.0, robot.length_m)
+        self._scales = np.array(self.settings.scales) * (robot.length_m, robot.length_m, 1.0, robot.length_m)
         self._runs = [
             integrator(undelayed(with_friction_times(robot, *friction)), problem.gaits.model)
-            for friction in FRICTIONS
+            for friction in self.settings.frictions
         ]
-        self._runs += [integrator(undelayed(suspect), suspect.own_model) for suspect in _yielding(robot)]
+        self._runs += [
+            integrator(undelayed(suspect), suspect.own_model) for suspect in _yielding(robot, settings)
+        ]
         self._seen = np.zeros(len(self._runs))
         self._prior = np.zeros(len(self._runs))
         if not robot.is_soft:
-            self._prior[len(FRICTIONS) :] = UNLIKELY
+            self._prior[len(self.settings.frictions) :] = self.settings.unlikely
         # how each suspect's body is bent by now, for the state that the last cycle ended with
         self._now = np.zeros(0)
         self._bends: dict[Integrator, Array] = {}
@@ -76,13 +116,17 @@ class FrictionEnsemble:
     @property
     def enough_m(self) -> float:
         """Clearance that is good enough."""
-        return ENOUGH_MARGINS * self.problem.margin_m
+        return self.settings.enough_margins * self.problem.margin_m
 
     @property
     def likely(self) -> tuple[float, float]:
-        """The one of FRICTIONS that explains best what was seen; (1, 1) also where a stiffness does."""
+        """The friction that explains best what was seen; (1, 1) also where a stiffness does."""
         best = int(self._misses.argmin())
-        return FRICTIONS[best] if best < len(FRICTIONS) else FRICTIONS[0]
+        return (
+            self.settings.frictions[best]
+            if best < len(self.settings.frictions)
+            else self.settings.frictions[0]
+        )
 
     def learn(self, before: Array, timeline: Timeline, after: Array, cycle: Cycle | None = None) -> None:
         """Take in one cycle: the state it began with and the state it ended with.
@@ -94,7 +138,9 @@ class FrictionEnsemble:
             outcome if isinstance(outcome, NoAnswerError) else self._bent(outcome, cycle)
             for outcome in foreseen
         ]
-        self._seen = FADING * self._seen + [_miss(outcome, after, self._scales) for outcome in bent]
+        self._seen = self.settings.fading * self._seen + [
+            _miss(outcome, after, self._scales) for outcome in bent
+        ]
         self._now = after.copy()
         self._bends = {
             run: outcome.final[run.layout.kappa.start : run.layout.dkappa.stop]
@@ -120,7 +166,7 @@ class FrictionEnsemble:
     def room_m(
         self, state: Array, timeline: Timeline, suspect: int | None = None, cycle: Cycle | None = None
     ) -> float:
-        """Return the smallest clearance with the likeliest suspect, or another (FRICTIONS come first).
+        """Return the smallest clearance with the likeliest suspect, or another (frictions come first).
 
         Minus infinity where the model cannot go on.
         """
@@ -138,7 +184,7 @@ class FrictionEnsemble:
     ) -> float:
         """Return the smallest clearance with any suspect; given up at one that leaves at most `worth_m`."""
         least_m = math.inf
-        possible = self._misses <= PLAUSIBLE + TIMES * self._misses.min()
+        possible = self._misses <= self.settings.plausible + self.settings.times * self._misses.min()
         for suspect in np.argsort(self._misses, kind="stable"):
             if possible[suspect]:
                 least_m = min(least_m, self.room_m(state, timeline, int(suspect), cycle))
@@ -147,14 +193,14 @@ class FrictionEnsemble:
         return least_m
 
 
-def _yielding(robot: Robot) -> list[Robot]:
+def _yielding(robot: Robot, settings: EnsembleSettings = DEFAULT_ENSEMBLE) -> list[Robot]:
     """Return robots that are softer or stiffer than the planned one, as far as it may be off."""
     if not robot.is_soft:
-        return [robot.with_values(bending_stiffness_n_m2=value) for value in STIFFNESSES_N_M2]
+        return [robot.with_values(bending_stiffness_n_m2=value) for value in settings.stiffnesses_n_m2]
     if robot.relative_sd.get(stiffness_key(robot)) is not None:
         return list(stiffness_interval(robot)[1:])
     key = stiffness_key(robot)
-    others = [robot.with_values(**{key: times * getattr(robot, key)}) for times in STIFFNESS_TIMES]
+    others = [robot.with_values(**{key: times * getattr(robot, key)}) for times in settings.stiffness_times]
     rigid = robot.with_values(bending_stiffness_n_m2=None, gap_stiffness_n_m2=None)
     return [*others, rigid]
 

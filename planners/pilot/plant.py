@@ -13,7 +13,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from planners.drive.friction_ensemble import FADING, FRICTIONS
+from planners.drive.friction_ensemble import DEFAULT_ENSEMBLE
 from planners.drive.plant import PlantStopped
 from planners.motion.robots import undelayed, with_friction_times
 from planners.pilot.observer import Latency, correct, straight_pose
@@ -85,9 +85,9 @@ class PilotedPlant:
         # the true robot's friction is not known: the motion is predicted with several, as the driver does
         self._runs = [
             integrator(undelayed(with_friction_times(problem.robot, *friction)), problem.gaits.model)
-            for friction in FRICTIONS
+            for friction in DEFAULT_ENSEMBLE.frictions
         ]
-        self._misfits = np.zeros(len(FRICTIONS))
+        self._misfits = np.zeros(len(DEFAULT_ENSEMBLE.frictions))
         self._problem, self._program = problem, program
         self._line, self._camera, self._clock, self._log = line, camera, clock, log
         self._tell, self._shows = tell, watch
@@ -173,7 +173,7 @@ class PilotedPlant:
                 self._watch(motions[int(self._misfits.argmin())], begin_s)
         self._look()
         corrections = [correct(m, begin_s, self._seen, self.latency, self._chain) for m in motions]
-        self._misfits = FADING * self._misfits + [c.misfit for c in corrections]
+        self._misfits = DEFAULT_ENSEMBLE.fading * self._misfits + [c.misfit for c in corrections]
         likely = int(self._misfits.argmin())
         motion, correction = motions[likely], corrections[likely]
         self.latency = correction.latency

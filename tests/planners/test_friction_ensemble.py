@@ -3,7 +3,7 @@
 import pytest
 from planner_rooms import corridor
 
-from planners.drive.friction_ensemble import FRICTIONS, FrictionEnsemble
+from planners.drive.friction_ensemble import DEFAULT_ENSEMBLE, FrictionEnsemble
 from planners.motion.robots import undelayed, with_friction_times
 from srs_opt.simulate.integrate import Integrator
 from srs_opt.simulate.timeline import Timeline
@@ -29,7 +29,7 @@ def test_unknown_friction_is_any(problem_in):
     ahead = Timeline.of_gait(gait, 3 * gait.period_s)
     start = problem.start
     state = problem.integrator.rest(start.x, start.y + 0.02, 0.15)
-    rooms = [ensemble.room_m(state, ahead, k) for k in range(len(FRICTIONS))]
+    rooms = [ensemble.room_m(state, ahead, k) for k in range(len(DEFAULT_ENSEMBLE.frictions))]
     assert max(rooms) - min(rooms) > 1e-4
     assert ensemble.least_room_m(state, ahead) == pytest.approx(min(rooms), abs=1e-12)
 
