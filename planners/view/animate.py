@@ -68,6 +68,9 @@ def save_animation(path: Path, problem: Problem, plan: Plan, execution: Executio
     rate = frames / max(time[-1], 1e-3)
     held = [*range(frames), *[frames - 1] * round(HOLD_S * rate)]  # at the end, before it begins anew
     plain_names(figure)
+    draw(0)
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")  # laid out once: half of what every frame would take
     animation = FuncAnimation(figure, draw, frames=held, interval=1000 / FRAMES_PER_S)
     movie = path.suffix.lower() == ".mp4"
     with atomic_path(path) as temporary:
