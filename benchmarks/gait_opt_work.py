@@ -43,7 +43,7 @@ def run(quick: bool) -> Section:
     rows = [_row("cold, four starts", first, cold_s)]
     earlier = {PROBLEM: first}
     shares, lost = [], []
-    for name, (before, changes) in (dict(list(MOVED.items())[:2]) if quick else MOVED).items():
+    for name, (before, changes) in (dict(list(MOVED.items())[:1]) if quick else MOVED).items():
         if before not in earlier:
             earlier[before] = search(before)
         problem = _moved(before, changes)
