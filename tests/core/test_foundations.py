@@ -172,11 +172,19 @@ def test_exit_statuses_and_streams(capsys):
 
 
 def test_bad_usage_is_one_line(capsys):
-    for arguments in (["--jobs", "0"], ["--nonsense"], ["--seed", "x"], ["--model", "other"], ["--rob", "x"]):
+    for arguments in (["--jobs", "0"], ["--nonsense"], ["--seed", "x"], ["--rob", "x"]):
         with pytest.raises(SystemExit) as caught:
             run_command(parser(), lambda o: Answer({}, ""), arguments)
         assert caught.value.code == 2
         assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_a_model_that_no_plugin_defines_is_refused_in_one_line(capsys):
+    """Plugins may define models, so that the name is looked at when they have run: before anything slow."""
+    assert run_command(parser(), lambda o: pytest.fail("it began"), ["--model", "other"]) == 2
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1
+    assert "complex, simplified, compliant" in err
 
 
 def test_default_folder_is_named_after_the_command(capsys):
