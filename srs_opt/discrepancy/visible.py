@@ -20,7 +20,7 @@ from srs_opt.errors import NoAnswerError
 from srs_opt.measurement.records import Trial
 
 SURELY = 1.28  # standard deviations above the level of detection: found nine times in ten
-_TRIALS = 3  # on which the effects are played: each costs a simulation per effect
+_TRIALS = 2  # on which the effects are played: each costs a simulation per effect
 
 
 @dataclass(frozen=True)
@@ -139,5 +139,5 @@ def _least(information: float, whole: float, candidate: Candidate, family: int) 
 def _spread(trials: Sequence[Trial]) -> list[Trial]:
     """Return a few trials, straight and turning."""
     ordered = sorted(trials, key=lambda t: (t.offset, t.name))
-    step = max(len(ordered) / _TRIALS, 1.0)
-    return [ordered[int(k * step)] for k in range(min(_TRIALS, len(ordered)))]
+    count = min(_TRIALS, len(ordered))
+    return [ordered[round(k * (len(ordered) - 1) / max(count - 1, 1))] for k in range(count)]
