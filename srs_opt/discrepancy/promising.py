@@ -8,7 +8,7 @@ from srs_opt.discrepancy.alike import Angles
 from srs_opt.discrepancy.diagnostics import TELLING, Diagnostics, needed_gain
 from srs_opt.discrepancy.screen import Score
 
-_CONTENDER = 0.45  # share of the best expected gain that earns a refit
+CONTENDER = 0.45  # share of the best expected gain that earns a refit
 _NEAR = 40.0  # or this little behind it
 # angle at which a member of a pair of look-alikes that is well behind in the screen is refitted all the same:
 # far from the linearisation's point an effect does up to sin^2 of it of something else
@@ -34,7 +34,7 @@ def promising(current: Diagnostics, depth: int, family: int) -> list[Score]:
     if not scores:
         return leaps
     best = scores[0].improvement
-    limit = min(_CONTENDER * best, max(best - _NEAR, 0.25 * best))
+    limit = min(CONTENDER * best, max(best - _NEAR, 0.25 * best))
     chosen = [s for s in scores if s.improvement >= limit]
     if depth == 0:
         angles = Angles(current.linearisation)

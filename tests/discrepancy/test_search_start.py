@@ -6,6 +6,7 @@ import pytest
 
 from srs_opt.calibrate.candidates import all_candidates
 from srs_opt.calibrate.trials import Point
+from srs_opt.discrepancy.answer import _fate
 from srs_opt.discrepancy.screen import Score
 from srs_opt.discrepancy.search import NEARER, Search
 
@@ -36,3 +37,14 @@ def test_a_refit_that_ends_worse_than_without_its_effect_begins_again_nearer(dev
     found = search._refit(current, [Score(candidate, 100.0, 0.0, step)], 5)
     assert begun == pytest.approx(starts)
     assert found.deviance == best
+
+
+@pytest.mark.parametrize(("gain", "said"), [(90.0, "acts otherwise"), (10.0, "well behind")])
+def test_a_candidate_that_was_not_refitted_is_said_to_be_behind_only_where_it_is(gain, said):
+    drag, pull = (next(c for c in all_candidates(5) if c.label == n) for n in ("tether_drag", "tether_pull"))
+    scores = Score(drag, 100.0, 0.0, [0.03]), Score(pull, gain, 0.0, [0.03])
+    best = SimpleNamespace(names=("tether_drag",))
+    found = SimpleNamespace(
+        selection=SimpleNamespace(best=best, rivals=()), tried={"tether_drag"}, scores=scores
+    )
+    assert said in _fate(found, scores[1], 100.0)
