@@ -192,6 +192,7 @@ class _Descent:
         self.correlated, self.near = correlated, near
         self.done, self.idle, self.damping = 0, 0, 0.0
         self.converged, self.behind, self.rough = False, math.inf, True
+        self.reached = math.nan  # deviance after the last step
         self.bends = True  # until derivatives turn out not to be kept
         self.winding = False  # whether the last step found the valley bent
 
@@ -355,12 +356,19 @@ class _Descent:
         return Point(moved.values, scatter)
 
     def hopeless(self, beat: float) -> bool:
-        """Whether the fit stays far behind the one to beat, and does not catch up."""
+        """Whether the fit stays far behind the one to beat, and does not catch up.
+
+        Neither what derivatives promise counts as catching up, if they promise more of it with every step,
+        nor does a step that gained more than is still missing count as falling behind: a body that begins to
+        bend starts far off and comes near in a few large steps.
+        """
+        now = objective(self.coordinates, self.equations, self.point, 1.0)
         excess = within_reach(self.coordinates, self.equations, self.point) - beat
         far = max(HOPELESS, HOPELESS_SHARE * abs(beat)) if math.isfinite(beat) else math.inf
         late = self.done >= TRIED and excess > far and excess > 0.5 * self.behind
+        gained, self.reached = self.reached - now, now
         self.behind = excess
-        return late
+        return late and not gained > now - beat
 
     def end(self, *, rough: bool) -> Fit:
         """Return the fit at the point, its derivatives fresh unless they need not be."""

@@ -330,7 +330,7 @@ class Search:
             start = self._start(current, score)
             beat = min((h.deviance for h in found), default=math.inf)
             hypothesis = self.try_out((*have, score.candidate), start, beat)
-            if hypothesis is not None and self._lost(hypothesis, current):
+            if hypothesis is not None and score not in bending and self._lost(hypothesis, current):
                 nearer = expected_start(current.linearisation, score, NEARER)
                 hypothesis = self.try_out((*have, score.candidate), nearer, beat)
             if hypothesis is not None:

@@ -118,3 +118,16 @@ def test_the_bend_of_a_valley_is_followed_to_second_order(away, share):
 def test_a_fit_that_was_cut_short_says_so():
     found = fit(Curved(1000), COORDINATES, Point({"size.of_it": 3.0, "width.of_it": -1.0}), iterations=1)
     assert not found.converged
+
+
+def test_a_fit_that_comes_from_far_is_not_given_up_while_it_gains():
+    """One to beat that is better than where the first steps lead, and worse than where they end."""
+    measured = Curved(1000)
+    start = Point({"size.of_it": 3.0, "width.of_it": -1.0})
+    best = fit(measured, COORDINATES, start, iterations=100)
+    found = fit(measured, COORDINATES, start, iterations=100, beat=best.deviance + 200)
+    assert best.converged
+    assert found.iterations == best.iterations
+    assert found.deviance == best.deviance
+    without_hope = fit(measured, COORDINATES, start, iterations=100, beat=best.deviance - 1e6)
+    assert without_hope.iterations < 5
