@@ -358,8 +358,8 @@ class _Descent:
     def hopeless(self, beat: float) -> bool:
         """Whether the fit stays far behind the one to beat, and does not catch up.
 
-        Neither what derivatives promise counts as catching up, if they promise more of it with every step,
-        nor does a step that gained more than is still missing count as falling behind: a body that begins to
+        What the derivatives promise to reach must come nearer by half with every step. A step that gained
+        more than is still missing is reason enough to go on, whatever they promise: a body that begins to
         bend starts far off and comes near in a few large steps.
         """
         now = objective(self.coordinates, self.equations, self.point, 1.0)
