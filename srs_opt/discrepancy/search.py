@@ -28,6 +28,7 @@ from srs_opt.discrepancy.hypothesis import (
 )
 from srs_opt.discrepancy.promising import akin, promising
 from srs_opt.discrepancy.screen import Score, expected_start, screen
+from srs_opt.discrepancy.soft_start import soft_start
 from srs_opt.discrepancy.split import brief_name
 from srs_opt.errors import NoAnswerError
 from srs_opt.measurement.records import Trial
@@ -44,9 +45,6 @@ QUICK_ITERATIONS = 10  # with the first seconds of a few trials, before all are 
 # shares of the misfit that fits which do not explain the data may leave to be gained: those, and all others
 ROUGHLY, NEARLY = 0.01, 0.001
 HOPELESS = 0.1  # share of the gap that the best known effects leave, from which on more data help nothing
-# of its typical size, from which a fit of what linearisation does not see begins; a fifth and the whole find
-# the same flexibility between 50 and 500 1/(N m^2), a tenth takes twice the iterations
-LEAP = 0.35
 NEARER = 0.2  # of the size that derivatives promise, from which a refit that got lost is begun again
 # refits with the best of the screen before one with a bending body, which costs as much as three of others
 BEFORE_BENDING = 2
@@ -329,6 +327,8 @@ class Search:
                 continue
             start = self._start(current, score)
             beat = min((h.deviance for h in found), default=math.inf)
+            if score in bending and not have:
+                beat = math.inf  # it begins far off, and explains nothing until it comes near
             hypothesis = self.try_out((*have, score.candidate), start, beat)
             if hypothesis is not None and score not in bending and self._lost(hypothesis, current):
                 nearer = expected_start(current.linearisation, score, NEARER)
@@ -360,19 +360,11 @@ class Search:
         return without is not None and added.deviance > without.deviance
 
     def _start(self, current: Diagnostics, score: Score) -> Point:
-        """Return where to begin a refit with a candidate added.
-
-        A body that begins to bend under load moves otherwise before it is as soft as the real one: what
-        calibration made of that (half the friction) hides it from derivatives about a rigid body. So it is
-        begun with soft, at the bench's values.
-        """
-        if not score.candidate.form.effect.bends:
-            return expected_start(current.linearisation, score)
-        fit = current.hypothesis.fit
-        effects = {c.name: fit.point.values[c.name] for c in fit.coordinates if c.effect}
-        values = {**start_point(self.base).values, **effects}
-        size, *_ = score.candidate.sizes
-        return Point({**values, size.name: LEAP * size.typical})
+        """Return where to begin a refit with a candidate added."""
+        if score.candidate.form.effect.bends:
+            about = self.experiment, self.base, score.candidate
+            return soft_start(*about, current.hypothesis, self.quick)
+        return expected_start(current.linearisation, score)
 
     def _worth(self, better: Hypothesis, current: Hypothesis) -> bool:
         gain = current.deviance - better.deviance

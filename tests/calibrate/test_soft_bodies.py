@@ -1,6 +1,7 @@
 """Calibration of bodies that bend under load, data from the laboratory's own formulation."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from srs_opt.calibrate.instruments import check_expectations
 from srs_opt.calibrate.model import Model
 from srs_opt.calibrate.result import bench_warnings
 from srs_opt.calibrate.run import calibrate
+from srs_opt.discrepancy.soft_start import LEAPS, soft_start
 from srs_opt.effects import all_effects
 from srs_opt.errors import InputError
 from srs_opt.measurement.dataset import load_dataset
@@ -26,16 +28,19 @@ GAITS = ((2.0, 55.0, 0.4, 1.571), (1.5, 41.0, 0.0, 1.571), (1.0, 48.0, -0.4, 0.9
 COMPLIANCE = all_effects()["bending_compliance"]
 
 
-@pytest.fixture(scope="module")
-def dataset(tmp_path_factory):
+def recorded(folder, stiffness_n_m2, gaits=GAITS):
     truth = Truth(
-        Parameters(bending_stiffness_n_m2=EI, bending_relaxation_s=0.007),
+        Parameters(bending_stiffness_n_m2=stiffness_n_m2, bending_relaxation_s=0.007),
         scatter=Scatter(0.0, 0.0, 0.0),
         friction_speed_m_s=0.001,
     )
-    trials = [Trial(f"t{k}", f, p, o, lag, duration_s=1.5) for k, (f, p, o, lag) in enumerate(GAITS)]
-    folder = write_dataset(tmp_path_factory.mktemp("lab") / "set", truth, trials, 3, Recording(rate_hz=60))
-    return load_dataset(folder)
+    trials = [Trial(f"t{k}", f, p, o, lag, duration_s=1.5) for k, (f, p, o, lag) in enumerate(gaits)]
+    return load_dataset(write_dataset(folder / "set", truth, trials, 3, Recording(rate_hz=60)))
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory):
+    return recorded(tmp_path_factory.mktemp("lab"), EI)
 
 
 def with_robot(dataset, **changes):
@@ -67,6 +72,18 @@ def test_the_effect_makes_a_rigid_robot_soft(dataset):
     found = fit(experiment, (*base, *candidate.coordinates), start)
     assert 1 / found.point.values["bending_compliance.flexibility"] == pytest.approx(EI, rel=0.02)
     assert not bench_warnings(found.off_bench)
+
+
+@pytest.mark.parametrize("leap", LEAPS)
+def test_a_fit_begins_near_the_softness_that_the_body_has(tmp_path, leap):
+    candidate = Candidate(Form(COMPLIANCE))
+    flexibility = leap * candidate.sizes[0].typical
+    rigid = with_robot(recorded(tmp_path, 0.95 / flexibility, GAITS[:1]))
+    experiment = Experiment(Model(rigid.robot), rigid.trials, 0.001)
+    base = fitted_coordinates(rigid.robot)
+    alone = SimpleNamespace(fit=SimpleNamespace(coordinates=base, point=start_point(base)))
+    start = soft_start(experiment, base, candidate, alone, rigid.trials)
+    assert start.values["bending_compliance.flexibility"] == flexibility
 
 
 def test_rigid_models_do_without_the_stiffness():
