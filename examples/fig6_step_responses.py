@@ -31,9 +31,8 @@ def generated(robot: Robot, rng: np.random.Generator) -> tuple[StepTest, ...]:
         for condition, curve in (("lifted", path.no_load), ("ground", path.kappa)):
             readings = np.interp(TIME_S, path.time_s, curve[:, SEGMENT - 1])
             readings += SD_1_M * rng.standard_normal(TIME_S.size)
-            tests.append(
-                StepTest(f"{condition} {pressure:g}", SEGMENT, condition, pressure, TIME_S, readings)
-            )
+            name = f"{condition} {pressure:g}"
+            tests.append(StepTest(name, SEGMENT, condition, pressure, TIME_S, readings))
     return tuple(tests)
 
 

@@ -67,6 +67,8 @@ def test_the_command(tmp_path, number, status):
     process = subprocess.Popen(
         [sys.executable, "-m", "planners.plan", maze, "--planner", "est", "--out", tmp_path / "out"],
         cwd=ROOT, stderr=subprocess.PIPE, text=True,
+        # whoever runs the tests in the background has switched Ctrl-C off
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )  # fmt: skip
     workers = []
     while not workers and process.poll() is None:
@@ -74,7 +76,10 @@ def test_the_command(tmp_path, number, status):
         workers = [line for line in children(process.pid) if "multiprocessing.spawn" in line]
     time.sleep(0.5)
     process.send_signal(number)
-    _, complaint = process.communicate(timeout=30)
+    try:
+        _, complaint = process.communicate(timeout=30)
+    finally:
+        process.kill()  # a failure here must not disturb the tests that follow
     assert process.returncode == status, complaint
     assert workers
     left = {line.split()[0] for line in workers}
