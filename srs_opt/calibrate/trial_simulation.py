@@ -121,8 +121,7 @@ def _applied(applied: Applied, end_s: float, trial: Trial) -> Timeline:
 
 
 def _scheduled(schedule: Schedule, segments: int, end_s: float, trial: Trial) -> Timeline:
-    """Play a schedule; a segment that it does not name stays vented."""
-    named = {segment for segment, _, _ in schedule.intervals}
+    """Play a schedule from its start."""
     period = schedule.period_s
     inner = {t % period for _, on, off in schedule.intervals for t in (on, off)}
     cycle = np.array(sorted({0.0, *inner}))
@@ -130,9 +129,7 @@ def _scheduled(schedule: Schedule, segments: int, end_s: float, trial: Trial) ->
     starts = starts[starts < end_s - 1e-9]
     durations = np.diff(np.append(starts, end_s))
     middles = starts + durations / 2
-    valve = np.stack(
-        [schedule.state(i, middles) if i in named else np.zeros(middles.size) for i in range(1, segments + 1)]
-    )
+    valve = np.stack([schedule.state(i, middles) for i in range(1, segments + 1)])
     frequency = trial.frequency_hz if trial.frequency_hz > 0 else 1 / period
     return Timeline.constant(durations, valve, trial.pressure_kpa, frequency)
 

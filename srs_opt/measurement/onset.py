@@ -76,6 +76,7 @@ def find_onset(
         raise NoAnswerError("the markers never move: give valve_start_s by hand")
     if moving < QUIET_FRAMES:
         return find_phase(robot, wave, time_s, markers_m, spots)
+    running: Onset | None = None
     if _drifts(markers_m.reshape(len(markers_m), -1)[: max(moving // 2, QUIET_FRAMES)], noise_sd(markers_m)):
         running = find_phase(robot, wave, time_s, markers_m, spots)
         if not running.doubt:
@@ -89,7 +90,7 @@ def find_onset(
     bracket = float((high - low) / np.sqrt(12))
     if found.left > MOST_LEFT or found.edge:
         # the start may lie before the first frame, and what was taken for rest be the slow first bend
-        running = find_phase(robot, wave, time_s, markers_m, spots)
+        running = running or find_phase(robot, wave, time_s, markers_m, spots)
         if running.left < min(found.left, MOST_LEFT):
             return running
         reason = (

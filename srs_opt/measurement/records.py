@@ -39,7 +39,8 @@ class Schedule:
         Period of the pattern.
     intervals : tuple of (segment, on_s, off_s)
         Segment (from 1) bends left (S = +1) from ``on_s`` to ``off_s``, both in
-        [0, period); ``off_s < on_s`` wraps. Outside its intervals S = -1.
+        [0, period); ``off_s < on_s`` wraps. Outside its intervals S = -1; a segment without
+        intervals stays vented, S = 0.
     """
 
     name: str
@@ -47,9 +48,11 @@ class Schedule:
     intervals: tuple[tuple[int, float, float], ...]
 
     def state(self, segment: int, time_s: Array) -> Array:
-        """Return S (+1 or -1) of `segment` at `time_s`."""
+        """Return S (+1, -1, or 0 where it has no intervals) of `segment` at `time_s`."""
         phase = np.mod(np.asarray(time_s, dtype=float), self.period_s)
         on = np.zeros(phase.shape, dtype=bool)
+        if all(number != segment for number, _, _ in self.intervals):
+            return np.zeros(phase.shape)
         for number, start, stop in self.intervals:
             if number == segment:
                 inside = (phase >= start) & (phase < stop)

@@ -17,6 +17,7 @@ from srs_opt.measurement.spots import Spots
 from srs_opt.measurement.valve_wave import ValveWave
 from srs_opt.robot import Robot
 from srs_opt.simulate.integrate import Integrator
+from srs_opt.simulate.interpolate import linear
 
 LEAST_RUN_IN_S, LEAST_RUN_IN_CYCLES = 1.5, 3  # after which a gait has forgotten how it began
 LEAST_CYCLES = 4  # in the recording: half of them are compared with the others
@@ -54,7 +55,7 @@ def likely_start_s(
     period, first = 1 / wave.frequency_hz, float(time_s[0])
     whole = min(int((time_s[-1] - first) / period), SEEN_CYCLES)
     marks = np.asarray(first + period * np.arange(whole + 1), dtype=np.float64)
-    seen, sd = _shares(time_s, _middles(markers_m), marks, noise_m / math.sqrt(markers_m.shape[1]))
+    seen, sd = _shares(time_s, markers_m.mean(axis=1), marks, noise_m / math.sqrt(markers_m.shape[1]))
     if seen is None:
         return float(starts_s[0])
     run, chain = Integrator(robot), chain_of(robot, spots)
@@ -73,21 +74,16 @@ def likely_start_s(
     return float(starts_s[best if misfits[0] - misfits[best] > EVIDENCE else 0])
 
 
-def _middles(markers_m: Array) -> Array:
-    """Return the mean of all markers, (T, 2), not a number where one is lost."""
-    return np.asarray(markers_m.mean(axis=1))
-
-
 def _shares(time_s: Array, middle_m: Array, marks_s: Array, sd_m: float) -> tuple[Array | None, float]:
     """Return every early cycle's way over the mean of the late ones', and the deviation of such a share.
 
-    The deviation is that of the markers' noise or of the late ways themselves, whichever is larger.
+    The middle is not a number where a marker is lost. The deviation is that of the markers' noise or of the
+    late ways themselves, whichever is larger.
     """
     whole = np.isfinite(middle_m).all(axis=1)
     if len(marks_s) <= LEAST_CYCLES or whole.sum() < 2:
         return None, math.nan
-    at = np.column_stack([np.interp(marks_s, time_s[whole], middle_m[whole, k]) for k in (0, 1)])
-    ways = np.linalg.norm(np.diff(at, axis=0), axis=1)
+    ways = np.linalg.norm(np.diff(linear(time_s[whole], middle_m[whole], marks_s), axis=0), axis=1)
     early, late = np.split(ways, [len(ways) // 2])
     mean = float(late.mean())
     if not mean > 10 * sd_m:  # it hardly moves on

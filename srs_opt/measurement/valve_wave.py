@@ -27,8 +27,7 @@ class ValveWave:
     def states(self, segment: int, time_s: Array) -> Array:
         """Return S of `segment`: +1 or -1, 0 (vented) where a schedule does not name it."""
         if self.schedule is not None:
-            named = any(number == segment for number, _, _ in self.schedule.intervals)
-            return self.schedule.state(segment, time_s) * named
+            return self.schedule.state(segment, time_s)
         wave = np.sin(2 * np.pi * self.frequency_hz * time_s + self.phase_lag_rad * segment)
         return np.where(wave + self.offset > 0, 1.0, -1.0)
 
