@@ -15,24 +15,48 @@ from srs_opt.measurement.records import Applied, Schedule, Trial
 from srs_opt.model.parameters import Structure
 from srs_opt.model.registry import state_layout
 from srs_opt.model.state import BODY, POSE, StateLayout
-from srs_opt.simulate.batched import Search, StepRequest, StepResult, run_one
+from srs_opt.simulate.adaptive import MeshSettings, NonFiniteMotionError, adapted
+from srs_opt.simulate.batched import Search, StepRequest, run_one
 from srs_opt.simulate.integrate import step_kernel
 from srs_opt.simulate.kernel import Kernel
 from srs_opt.simulate.mesh import Mesh
 from srs_opt.simulate.timeline import Timeline
 
-STEP_S = 0.005
-# local error of the body's speed per step; 5e-6 keeps the track within about 0.01 mm, well below what a
-# thousand frames of 1 mm markers can see
-TOLERANCE_M_S = 5e-6
-FINEST_M_S = 2e-7
-ACCEPTED = 15.0  # single steps may be worse: friction forgets an error of speed within milliseconds
-ATTEMPTS = 12  # of refining a cycle's mesh; four left a trial a millimetre off where friction is sharpest
-WASTEFUL = 0.3  # share of its steps that would do, below which a mesh is made anew
+
+@dataclass(frozen=True)
+class TrialSettings:
+    """How finely trials are simulated, and how far beyond their last label.
+
+    Attributes
+    ----------
+    tolerance_m_s : float
+        Local error of the body's speed per step; 5e-6 keeps the track within about 0.01 mm, well below what a
+        thousand frames of markers with 1 mm of noise can see.
+    finest_m_s : float
+        Finest tolerance that long takes with little noise may ask for; below, rounding counts.
+    first_step_s : float
+        First guess of the steps.
+    tail_s : float
+        Simulated beyond the last label, for clocks that run late.
+    fastest_clock : float
+        Times as long beyond it, where clocks may run fast.
+    latest_marker_s : float
+        By which a marker may be seen later than the one before it.
+    """
+
+    tolerance_m_s: float = 5e-6
+    finest_m_s: float = 2e-7
+    first_step_s: float = 0.005
+    tail_s: float = 0.05
+    fastest_clock: float = 0.03
+    latest_marker_s: float = 0.03
+
+
+TRIAL = TrialSettings()
+# A mesh from where the motion nearly broke down would slow all that follow: it is made anew. A trial whose
+# parameters are out of range is given up at once, because a fit tries many.
+TRIAL_MESH = MeshSettings(accepted=15.0, free_attempts=12, attempts=12, halvings=0, wasteful=0.3)
 SAME_S = 1e-12  # durations of phases nearer than this are the same, and differ by rounding
-_TAIL_S = 0.05  # simulated beyond the last label, for clocks that run late
-_FASTEST_CLOCK = 0.03  # times as long beyond it where clocks may run fast
-_LATEST_S = 0.03  # by which a marker may be seen later than the one before it
 # (tolerance, cycle) -> what the valves did, and the mesh that served
 Meshes = dict[tuple[float, int], tuple[tuple[float, ...], Mesh]]
 
@@ -88,15 +112,15 @@ def tolerance_for(values: int, sd_m: float) -> float:
 
     An error of the track counts as its square, over the noise's, times the number of values.
     """
-    needed = TOLERANCE_M_S * (sd_m / 0.001) * math.sqrt(15_000 / max(values, 1))
-    return min(TOLERANCE_M_S, max(FINEST_M_S, needed))
+    needed = TRIAL.tolerance_m_s * (sd_m / 0.001) * math.sqrt(15_000 / max(values, 1))
+    return min(TRIAL.tolerance_m_s, max(TRIAL.finest_m_s, needed))
 
 
 def timeline_of(
     trial: Trial, segments: int, fastest_clock: float = 0.0, latest_marker_s: float = 0.0
 ) -> Timeline:
     """Return what the valves do in a trial, a little longer than it was recorded."""
-    end = float(trial.time_s[-1]) * (1 + fastest_clock) + _TAIL_S + latest_marker_s
+    end = float(trial.time_s[-1]) * (1 + fastest_clock) + TRIAL.tail_s + latest_marker_s
     if trial.kind == "still":
         return Timeline.vent(segments, end, trial.pressure_kpa)
     if trial.applied is not None:
@@ -145,12 +169,12 @@ class TrialRun:
     def __init__(self, model: Model, trial: Trial) -> None:
         self.model, self.trial = model, trial
         self.conditions = conditions_of(trial)
-        fastest = _FASTEST_CLOCK if model.clock_drifts else 0.0
-        latest_s = _LATEST_S * model.segments if model.markers_lag else 0.0
+        fastest = TRIAL.fastest_clock if model.clock_drifts else 0.0
+        latest_s = TRIAL.latest_marker_s * model.segments if model.markers_lag else 0.0
         self.timeline = timeline_of(trial, model.segments, fastest, latest_s)
         self.meshes: Meshes = {}
 
-    def __call__(self, values: Values, tolerance_m_s: float = TOLERANCE_M_S) -> Nodes:
+    def __call__(self, values: Values, tolerance_m_s: float = TRIAL.tolerance_m_s) -> Nodes:
         """Simulate the trial, with a local error of `tolerance_m_s` in the body's speed.
 
         Raises
@@ -161,7 +185,7 @@ class TrialRun:
         return run_one(self.search(values, tolerance_m_s))
 
     def search(
-        self, values: Values, tolerance_m_s: float = TOLERANCE_M_S, attempts: int = ATTEMPTS
+        self, values: Values, tolerance_m_s: float = TRIAL.tolerance_m_s, attempts: int | None = None
     ) -> Search[Nodes]:
         """Do what a call does, as a search: see `simulate.batched` for many trials at once.
 
@@ -200,24 +224,22 @@ class TrialRun:
         x: np.ndarray,
         piece: Timeline,
         p: np.ndarray,
-        attempts: int,
+        attempts: int | None,
     ) -> Search[tuple[np.ndarray, Mesh]]:
         """Integrate one cycle on the mesh that served it last time, refined where that is too coarse."""
         phases = (*np.round(piece.duration_s, 7), *piece.valve.ravel())
         tolerance, number = key
         kept = self.meshes.get(key) or self.meshes.get((tolerance, number - 1))
-        mesh = _fitted(kept, piece.duration_s, phases) or Mesh.uniform(piece.duration_s, STEP_S)
-        for attempt in range(attempts):
-            got = yield StepRequest(kernel, x, mesh, piece.valve, p)
-            _check(got)
-            fine = got.error_m_s.max() <= ACCEPTED * tolerance
-            # a mesh from where the motion nearly broke down would slow all that follow
-            wasteful = fine and mesh.wanted(got.error_m_s, tolerance) < WASTEFUL * mesh.h_s.size
-            if (fine and not wasteful) or attempt == attempts - 1:
-                break
-            mesh = mesh.refined(got.error_m_s, tolerance)
-        self.meshes[key] = (phases, mesh)
-        return got.states, mesh
+        mesh = _fitted(kept, piece.duration_s, phases) or Mesh.uniform(piece.duration_s, TRIAL.first_step_s)
+        request = StepRequest(kernel, x, mesh, piece.valve, p)
+        try:
+            got = yield from adapted(request, tolerance, TRIAL_MESH, attempts=attempts)
+        except NonFiniteMotionError:
+            raise NoAnswerError(
+                "the simulated motion of a trial becomes non-finite; effect sizes out of range"
+            ) from None
+        self.meshes[key] = (phases, got.mesh)
+        return got.states, got.mesh
 
 
 def _fitted(
@@ -236,11 +258,6 @@ def _fitted(
     if np.abs(duration_s - known_s).max() < SAME_S:
         return mesh
     return Mesh(mesh.h_s * (duration_s / known_s)[mesh.phase], mesh.phase)
-
-
-def _check(got: StepResult) -> None:
-    if not np.isfinite(got.states[:, -1]).all():
-        raise NoAnswerError("the simulated motion of a trial becomes non-finite; effect sizes out of range")
 
 
 def _cycles(timeline: Timeline, period_s: float) -> list[Timeline]:

@@ -19,7 +19,7 @@ from srs_opt.calibrate.noise import Noise, track_of
 from srs_opt.calibrate.normal_equations import NormalEquations, trial_normal_equations
 from srs_opt.calibrate.observe import Prediction, predict
 from srs_opt.calibrate.smooth import smooth_terms
-from srs_opt.calibrate.trial_simulation import ATTEMPTS, Meshes, Nodes, TrialRun
+from srs_opt.calibrate.trial_simulation import Meshes, Nodes, TrialRun
 from srs_opt.calibrate.whiten import Whitening
 from srs_opt.errors import NoAnswerError
 from srs_opt.measurement.records import Trial
@@ -230,7 +230,7 @@ class Trials:
                 known[n] = self._motions[n][1]
         tolerance = self.tolerance_m_s * (ROUGHER if request.rough else 1.0)
         rest = [n for n in names if n not in known]
-        attempts = [1 if self._last.get(n) == wanted[n] else ATTEMPTS for n in rest]
+        attempts = [1 if self._last.get(n) == wanted[n] else None for n in rest]
         point = request.point
         searches = [self.runs[n].search(point.of_trial(n), tolerance, a) for n, a in zip(rest, attempts)]
         for name, nodes in zip(rest, run_batched(searches)):

@@ -12,7 +12,7 @@ from srs_opt.manoeuvre.shooting import Shot
 from srs_opt.manoeuvre.task import Task
 from srs_opt.manoeuvre.valves import ValvePlan
 from srs_opt.model.state import POSE, VELOCITY
-from srs_opt.simulate.integrate import TOLERANCE_M_S, Integrator, Trajectory
+from srs_opt.simulate.integrate import INTEGRATION, Integrator, Trajectory
 
 FINER = 16.0
 RATIO = 4.0  # of the errors of the two integrations at least, as in the planner's certificate
@@ -75,8 +75,8 @@ class Certificate:
 
 def certify(run: Integrator, task: Task, plan: ValvePlan) -> tuple[Certificate, Trajectory]:
     """Simulate a manoeuvre afresh and check it against its task."""
-    coarse = run.integrate(plan.timeline(), task.start.state, TOLERANCE_M_S / FINER)
-    fine = run.integrate(plan.timeline(), task.start.state, TOLERANCE_M_S / FINER**2)
+    coarse = run.integrate(plan.timeline(), task.start.state, INTEGRATION.tolerance_m_s / FINER)
+    fine = run.integrate(plan.timeline(), task.start.state, INTEGRATION.tolerance_m_s / FINER**2)
     apart = (coarse.final[POSE] - fine.final[POSE]) * (1.0, 1.0, 0.1)
     error = float(np.hypot(*apart[:2]) + abs(apart[2])) / RATIO
     shot = Shot(plan, fine.time_s, seen_states(run, fine))

@@ -11,7 +11,7 @@ rest: the motion is simulated until it has all but settled, and Newton only fini
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import casadi as ca
@@ -24,28 +24,70 @@ from srs_opt.model.registry import build
 from srs_opt.model.state import POSE, WORK
 from srs_opt.orbit.actuators import periodic_actuators
 from srs_opt.orbit.period_map import PeriodMap, period_map, plain_period_map
-from srs_opt.simulate.batched import Search
-from srs_opt.simulate.integrate import LOOSE, TOLERANCE_M_S, Integrator
+from srs_opt.simulate.adaptive import MESH, NonFiniteMotionError, adapted
+from srs_opt.simulate.batched import Search, StepRequest
+from srs_opt.simulate.integrate import INTEGRATION, Integrator
 from srs_opt.simulate.mesh import Mesh
 from srs_opt.simulate.tableau import LEVER_M
 
-_NEWTON_STEPS = 30
-_CLOSED_M_S = 1e-9
-_WARM_UP_PERIODS = 2
-_SETTLING_PERIODS, _REFINEMENTS = 10, 4
-_SETTLE_PERIODS = 5
-_EVEN_STEP_S = 0.004
-_ROUGH_M_S = 1e-3
-_MESHES = 4
-_BEND_TIME_S = 0.05  # turns a bend into a rate: about 1/omega of a soft body's slowest mode
-# from rest: Newton starts where so many cycles in a row change by less than this, and must end within so many
-# times what the last change says is left to go, and within reach
-_NEARLY_M_S, _QUIET_PERIODS, _NEAR, _FARTHEST_M_S = 2e-3, 3, 3.0, 0.15
-_SAME_M_S = (
-    2e-3  # Newton's mesh is finer than that on which the motion settled, which moves the orbit a little
-)
-_MOST_PERIODS = 200
-_HALVINGS = 5
+
+@dataclass(frozen=True)
+class OrbitSettings:
+    """How a periodic orbit is searched. Speeds in m/s measure all dynamic states, scaled to compare.
+
+    Attributes
+    ----------
+    newton_steps : int
+        At most, on one mesh; six are usual.
+    closed_m_s : float
+        By how much the states of a closed orbit change per cycle: rounding leaves 1e-12.
+    rough_m_s : float
+        The same on the even first mesh: only there is the mesh worth adapting, because friction's sharp
+        features move with the motion. Smaller: Newton steps that the next mesh repeats; larger: a mesh
+        adapted to another motion.
+    meshes : int
+        Adapted at most.
+    first_step_s : float
+        Of the even first mesh.
+    warm_up_periods : int
+        Simulated from rest before the first Newton step.
+    settle_periods : int
+        Simulated where Newton's step does not lead nearer.
+    settling_periods : int
+        Simulated, on adapted meshes, where Newton fails from the warm-up's end.
+    bend_time_s : float
+        Turns a bend into a rate: about 1/omega of a soft body's slowest mode.
+    nearly_m_s, quiet_periods : float, int
+        From rest: Newton starts where so many cycles in a row change by less than this. Larger: Newton may
+        find another orbit than the one that is reached.
+    nearness, farthest_m_s : float
+        And its orbit counts within so many times what the last change says is left to go, and within this.
+    same_m_s : float
+        Allowed besides: Newton's mesh is finer than that on which the motion settled, which moves the orbit.
+    most_periods : int
+        From rest, before the motion counts as one that does not repeat.
+    """
+
+    newton_steps: int = 30
+    closed_m_s: float = 1e-9
+    rough_m_s: float = 1e-3
+    meshes: int = 4
+    first_step_s: float = 0.004
+    warm_up_periods: int = 2
+    settle_periods: int = 5
+    settling_periods: int = 10
+    bend_time_s: float = 0.05
+    nearly_m_s: float = 2e-3
+    quiet_periods: int = 3
+    nearness: float = 3.0
+    farthest_m_s: float = 0.15
+    same_m_s: float = 2e-3
+    most_periods: int = 200
+
+
+ORBIT = OrbitSettings()
+# The motion from rest decides which orbit is found, so that its mesh may get coarser once more than others.
+ORBIT_MESH = replace(MESH, free_attempts=4, attempts=12)
 
 
 @dataclass(frozen=True)
@@ -78,7 +120,7 @@ class PeriodicSolution:
 
 
 def search_orbit(
-    run: Integrator, gait: Gait, tolerance: float = TOLERANCE_M_S, guess: np.ndarray | None = None
+    run: Integrator, gait: Gait, tolerance: float = INTEGRATION.tolerance_m_s, guess: np.ndarray | None = None
 ) -> Search[PeriodicSolution]:
     """Search the periodic orbit of `gait`.
 
@@ -94,12 +136,12 @@ def search_orbit(
         If the motion does not close on itself.
     """
     cycle = Cycle.of(run, gait)
-    mesh = Mesh.uniform(cycle.durations_s, _EVEN_STEP_S)
+    mesh = Mesh.uniform(cycle.durations_s, ORBIT.first_step_s)
     if run.structure.compliant and guess is None:
         return (yield from _reached_from(cycle, run.rest(), mesh, tolerance))
     try:
         dynamic = np.zeros(len(run.layout.dynamic)) if guess is None else guess
-        for _ in range(_WARM_UP_PERIODS if guess is None else 0):
+        for _ in range(ORBIT.warm_up_periods if guess is None else 0):
             dynamic = (yield from cycle.plain_period_map(dynamic, mesh)).dynamic
         return (yield from _closed(cycle, dynamic, mesh, tolerance))
     except NoAnswerError:  # a misleading guess, or even steps too long for this motion
@@ -113,7 +155,7 @@ def search_orbit(
 
 
 def reached_from(
-    run: Integrator, gait: Gait, dynamic: np.ndarray, tolerance: float = TOLERANCE_M_S
+    run: Integrator, gait: Gait, dynamic: np.ndarray, tolerance: float = INTEGRATION.tolerance_m_s
 ) -> Search[PeriodicSolution]:
     """Search the orbit that `gait` leads to from given dynamic states at time 0, actuators on their cycle.
 
@@ -123,7 +165,7 @@ def reached_from(
         If the motion does not settle.
     """
     cycle = Cycle.of(run, gait)
-    mesh = Mesh.uniform(cycle.durations_s, _EVEN_STEP_S)
+    mesh = Mesh.uniform(cycle.durations_s, ORBIT.first_step_s)
     return (yield from _reached_from(cycle, cycle.start(dynamic), mesh, tolerance))
 
 
@@ -133,54 +175,49 @@ def _reached_from(cycle: Cycle, x: np.ndarray, mesh: Mesh, tolerance: float) -> 
     Newton's orbit counts only if it is stable and near the motion that has all but settled: otherwise the
     motion goes on, to be tried again where it changes ten times less from cycle to cycle.
     """
-    settled, goal = 0, _NEARLY_M_S
+    settled, goal = 0, ORBIT.nearly_m_s
     before = x[cycle.run.layout.dynamic]
-    for count in range(_MOST_PERIODS):
-        mapped, mesh = yield from _accurate_period_map(cycle, x, mesh, tolerance)
-        x = mapped.states[:, -1].copy()
+    for count in range(ORBIT.most_periods):
+        end, mesh = yield from _accurate_period_map(cycle, x, mesh, tolerance)
+        x = end.copy()
         x[POSE], x[WORK] = 0.0, 0.0
-        change, before = cycle.size(mapped.dynamic - before), mapped.dynamic
+        after = x[cycle.run.layout.dynamic]
+        change, before = cycle.size(after - before), after
         settled = settled + 1 if change < goal else 0
-        if settled < _QUIET_PERIODS:
+        if settled < ORBIT.quiet_periods:
             continue
         try:
             found = yield from _closed(cycle, before, mesh, tolerance, adapted=True)
         except NoAnswerError:
-            if count > _MOST_PERIODS // 2:
+            if count > ORBIT.most_periods // 2:
                 raise
         else:
             away = cycle.size(found.start[cycle.run.layout.dynamic] - before)
             largest = found.largest_multiplier
             # what is left to go: the changes to come are a geometric series
-            if largest < 1 and away <= _SAME_M_S + min(_NEAR * change / (1 - largest), _FARTHEST_M_S):
+            if largest < 1 and away <= ORBIT.same_m_s + min(
+                ORBIT.nearness * change / (1 - largest), ORBIT.farthest_m_s
+            ):
                 return found
         goal = change / 10
     raise cycle.no_answer(
         f"the motion still changes by {change:.2g} m/s from cycle to cycle after "
-        f"{_MOST_PERIODS} cycles; it does not repeat with the gait's period"
+        f"{ORBIT.most_periods} cycles; it does not repeat with the gait's period"
     )
 
 
 def _accurate_period_map(
     cycle: Cycle, x: np.ndarray, mesh: Mesh, tolerance: float
-) -> Search[tuple[PeriodMap, Mesh]]:
-    """Return the period map from state `x` on a mesh that is fine enough for it."""
-    for attempt in range(3 * _REFINEMENTS):
-        mapped = yield from plain_period_map(cycle.run, x, mesh, cycle.valve, cycle.p)
-        for _ in range(_HALVINGS):  # steps can be so long that the motion leaves what numbers can hold
-            if np.isfinite(mapped.states[:, -1]).all():
-                break
-            mesh = mesh.halved()
-            mapped = yield from plain_period_map(cycle.run, x, mesh, cycle.valve, cycle.p)
-        if not np.isfinite(mapped.states[:, -1]).all():
-            raise cycle.no_answer(
-                "the motion becomes non-finite; check pressure, masses, time constants and effect sizes"
-            )
-        if mapped.error_m_s.max() <= LOOSE * tolerance:
-            break
-        least = tolerance if attempt >= _REFINEMENTS else 0.0  # from then on it only gets finer
-        mesh = mesh.refined(np.maximum(mapped.error_m_s, least), tolerance)
-    return mapped, mesh
+) -> Search[tuple[np.ndarray, Mesh]]:
+    """Return the state one period after state `x`, and a mesh that is fine enough for that motion."""
+    request = StepRequest(cycle.run.kernel, x, mesh, cycle.valve, cycle.p)
+    try:
+        got = yield from adapted(request, tolerance, ORBIT_MESH)
+    except NonFiniteMotionError:
+        raise cycle.no_answer(
+            "the motion becomes non-finite; check pressure, masses, time constants and effect sizes"
+        ) from None
+    return got.states[:, -1], got.mesh
 
 
 @dataclass(frozen=True)
@@ -203,7 +240,7 @@ class Cycle:
         scale = np.array([1.0, 1.0, LEVER_M / _inertia(run, act, p)])
         if run.structure.compliant:
             bend = LEVER_M * run.robot.segment_length_m * np.ones(run.structure.segments)
-            scale = np.concatenate([scale, bend / _BEND_TIME_S, bend])
+            scale = np.concatenate([scale, bend / ORBIT.bend_time_s, bend])
         return Cycle(run, gait, *gait.phases(), act, p, scale)
 
     def start(self, dynamic: np.ndarray) -> np.ndarray:
@@ -242,7 +279,11 @@ def _closed(
     mapped: PeriodMap | None = None
     # an even mesh finds the orbit roughly; only there is the mesh worth adapting (friction's sharp
     # features move with the motion), then Newton finishes on the adapted mesh
-    goals = [_CLOSED_M_S] * _MESHES if adapted else [_ROUGH_M_S, *[_CLOSED_M_S] * _MESHES]
+    goals = (
+        [ORBIT.closed_m_s] * ORBIT.meshes
+        if adapted
+        else [ORBIT.rough_m_s, *[ORBIT.closed_m_s] * ORBIT.meshes]
+    )
     for attempt, goal_m_s in enumerate(goals):
         if mapped is not None:
             wanted = tolerance / attempt  # finer each time, so that this ends
@@ -251,11 +292,11 @@ def _closed(
         total += count
         size = cycle.size(mapped.dynamic - dynamic)
         closed = size <= max(goal_m_s, 1e-6)
-        if not closed and (attempt == len(goals) - 1 or not size <= _ROUGH_M_S):
+        if not closed and (attempt == len(goals) - 1 or not size <= ORBIT.rough_m_s):
             raise cycle.no_answer(
                 f"after {total} Newton steps the body's speed still changes by {size:.2g} m/s per cycle"
             )
-        if closed and goal_m_s == _CLOSED_M_S and mapped.error_m_s.max() <= LOOSE * tolerance:
+        if closed and goal_m_s == ORBIT.closed_m_s and mapped.error_m_s.max() <= MESH.accepted * tolerance:
             break
     assert mapped is not None
     monodromy = cycle.scale[:, None] * mapped.monodromy / cycle.scale
@@ -268,7 +309,7 @@ def _newton(
     """Return dynamic states, the period map there and the number of steps; settles where Newton stalls."""
     mapped = yield from cycle.period_map(dynamic, mesh)
     count = 0
-    while (size := cycle.size(mapped.dynamic - dynamic)) > goal_m_s and count < _NEWTON_STEPS:
+    while (size := cycle.size(mapped.dynamic - dynamic)) > goal_m_s and count < ORBIT.newton_steps:
         count += 1
         step = _newton_direction(mapped.monodromy, mapped.dynamic - dynamic)
         for factor in (1.0, 0.3, 0.1) if np.isfinite(step).all() else ():
@@ -278,7 +319,7 @@ def _newton(
                 break
         else:  # no descent along Newton's direction: let the motion itself settle
             trial = dynamic
-            for _ in range(_SETTLE_PERIODS):
+            for _ in range(ORBIT.settle_periods):
                 trial = (yield from cycle.plain_period_map(trial, mesh)).dynamic
             there = yield from cycle.period_map(trial, mesh)
         dynamic, mapped = trial, there
@@ -296,9 +337,9 @@ def _newton_direction(m: np.ndarray, residual: np.ndarray) -> np.ndarray:
 def _settled(cycle: Cycle, mesh: Mesh, tolerance: float) -> Search[tuple[np.ndarray, Mesh]]:
     """Return the dynamic states after some periods from rest and a mesh on which that motion is accurate."""
     dynamic, mesh = np.zeros(len(cycle.run.layout.dynamic)), mesh.halved().halved()
-    for _ in range(_SETTLING_PERIODS):
-        mapped, mesh = yield from _accurate_period_map(cycle, cycle.start(dynamic), mesh, tolerance)
-        dynamic = mapped.dynamic
+    for _ in range(ORBIT.settling_periods):
+        end, mesh = yield from _accurate_period_map(cycle, cycle.start(dynamic), mesh, tolerance)
+        dynamic = end[cycle.run.layout.dynamic]
     return dynamic, mesh
 
 

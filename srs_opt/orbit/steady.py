@@ -22,7 +22,7 @@ from srs_opt.result import Result
 from srs_opt.robot import Robot
 from srs_opt.simulate.batched import Search, run_batched, run_one
 from srs_opt.simulate.cycle_motion import CycleMotion, cycle_motion
-from srs_opt.simulate.integrate import TOLERANCE_M_S, Integrator
+from srs_opt.simulate.integrate import INTEGRATION, Integrator
 from srs_opt.simulate.rosenbrock import WORK
 
 if TYPE_CHECKING:
@@ -134,7 +134,7 @@ def steady_gait(
     gait: Gait,
     model: str | None = None,
     *,
-    tolerance: float = TOLERANCE_M_S,
+    tolerance: float = INTEGRATION.tolerance_m_s,
     guess: np.ndarray | None = None,
 ) -> Orbit:
     """Return the steady state of `gait`.
@@ -165,7 +165,7 @@ def steady_gaits(
     gaits: Sequence[Gait],
     model: str | None = None,
     *,
-    tolerance: float = TOLERANCE_M_S,
+    tolerance: float = INTEGRATION.tolerance_m_s,
     jobs: int = 1,
 ) -> list[Orbit | NoAnswerError]:
     """Return the steady states of many gaits, several at a time in each call of the compiled code.

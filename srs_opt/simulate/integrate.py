@@ -12,19 +12,38 @@ from srs_opt.model.parameters import Structure, valve_delay_s
 from srs_opt.model.registry import build, state_layout
 from srs_opt.model.state import POSE, VELOCITY, WORK, StateLayout
 from srs_opt.robot import Robot
+from srs_opt.simulate.adaptive import NonFiniteMotionError, adapted, finite_steps
 from srs_opt.simulate.batched import Search, StepRequest, run_one
 from srs_opt.simulate.kernel import Kernel
 from srs_opt.simulate.mesh import Mesh
 from srs_opt.simulate.rosenbrock import step_function
 from srs_opt.simulate.timeline import Timeline
 
-_REFINEMENTS = 3  # of a mesh, coarser here and finer there; after them it only gets finer
-_ATTEMPTS = 12
-_HALVINGS = 5  # of a mesh whose steps are so long that the motion leaves what numbers can hold
-STEP_S = 0.005  # first guess of the step
-LOOSE = 8.0  # a mesh is kept while no step errs by more than this many tolerances
-MANY = 32  # alike pieces integrated in one call
-TOLERANCE_M_S = 3e-5  # local error of the body speed per step: about 1e-4 of the distance travelled
+
+@dataclass(frozen=True)
+class IntegrationSettings:
+    """How finely a timeline is integrated.
+
+    Attributes
+    ----------
+    tolerance_m_s : float
+        Local error of the body's speed per step: about 1e-4 of the distance travelled. An error of 1/16 takes
+        twice as many steps.
+    first_step_s : float
+        First guess of the steps; only what the first attempt costs depends on it.
+    most_alike : int
+        Alike pieces integrated in one call. More: more is integrated in vain where the mesh stops serving.
+    longest_phases : int
+        Phases of one piece at most, where a gait switches its valves so often: a mesh is adapted as a whole.
+    """
+
+    tolerance_m_s: float = 3e-5
+    first_step_s: float = 0.005
+    most_alike: int = 32
+    longest_phases: int = 400
+
+
+INTEGRATION = IntegrationSettings()
 
 
 @lru_cache(maxsize=32)
@@ -123,7 +142,9 @@ class Integrator:
         """
         return run_one(self.stepping(x, mesh, valve, p))
 
-    def integrate(self, timeline: Timeline, x: np.ndarray, tolerance: float = TOLERANCE_M_S) -> Trajectory:
+    def integrate(
+        self, timeline: Timeline, x: np.ndarray, tolerance: float = INTEGRATION.tolerance_m_s
+    ) -> Trajectory:
         """Integrate over a whole timeline from state `x` (the robot's valve delay is applied here).
 
         Raises
@@ -137,7 +158,7 @@ class Integrator:
         self,
         timeline: Timeline,
         x: np.ndarray,
-        tolerance: float = TOLERANCE_M_S,
+        tolerance: float = INTEGRATION.tolerance_m_s,
         like: Trajectory | None = None,
     ) -> Search[Trajectory]:
         """Do what `integrate` does, as a search: see `run_batched` for many at once.
@@ -154,14 +175,19 @@ class Integrator:
             mesh = known.get(key) or self._first_mesh(piece.duration_s, start, tolerance, like)
             done = 1
             while repeats:  # twice as many at a time while the mesh serves
-                many = min(repeats, 2 * done, MANY)
-                new, error, mesh, done = yield from self._alike(x, mesh, piece.valve, p, many, tolerance)
+                many = min(repeats, 2 * done, INTEGRATION.most_alike)
+                request = StepRequest(self.kernel, x, mesh, piece.valve, p)
+                try:
+                    got = yield from adapted(request, tolerance, pieces=many)
+                except NonFiniteMotionError as error:
+                    raise self._non_finite(error) from None
+                mesh, done = got.mesh, got.pieces
                 repeats -= done
-                x = new[:, -1]
+                x = got.states[:, -1]
                 times.append(start + np.cumsum(np.tile(mesh.h_s, done)))
                 start = float(times[-1][-1])
-                states.append(new)
-                errors.append(error)
+                states.append(got.states)
+                errors.append(got.error_m_s)
             known[key] = mesh
         return _trajectory(
             np.concatenate(times),
@@ -174,7 +200,7 @@ class Integrator:
     def _first_mesh(durations: np.ndarray, begin_s: float, tolerance: float, like: Trajectory | None) -> Mesh:
         """Return the first guess of the steps of a piece that begins at a time."""
         if like is None:
-            return Mesh.uniform(durations, STEP_S)
+            return Mesh.uniform(durations, INTEGRATION.first_step_s)
         first, last = np.searchsorted(like.time_s, [begin_s + 1e-9, begin_s + durations.sum() - 1e-9])
         window = slice(max(int(first) - 1, 0), int(last))
         nodes = like.time_s[window.start : window.stop + 1].copy()
@@ -192,48 +218,20 @@ class Integrator:
         alike = np.zeros(timeline.duration_s.size)
         return [piece.at_one_pressure() for piece in _pieces(timeline, alike)]
 
-    def _alike(
-        self, x: np.ndarray, mesh: Mesh, valve: np.ndarray, p: np.ndarray, many: int, tolerance: float
-    ) -> Search[tuple[np.ndarray, np.ndarray, Mesh, int]]:
-        """Integrate `many` alike pieces in one call, as far as the mesh is fine enough; else one, refining.
-
-        Returns states (nx, n), errors (n,), the mesh of each piece and how many pieces were done.
-        """
-        halvings = 0
-        for attempt in range(_ATTEMPTS):
-            repeated = mesh.repeated(many, valve.shape[1])
-            try:
-                states, errors = yield from self.stepping(x, repeated, np.tile(valve, many), p)
-            except NoAnswerError:
-                halvings += many == 1
-                if halvings > _HALVINGS:
-                    raise
-                mesh, many = mesh if many > 1 else mesh.halved(), 1
-                continue
-            worst = errors.reshape(many, -1).max(axis=1)
-            good = int(np.argmax([*(worst > LOOSE * tolerance), True]))
-            if good:
-                kept = good * mesh.h_s.size
-                return states[:, :kept], errors[:kept], mesh, good
-            # stretches at rest look easy until their steps are longer than what happens at their end
-            least = tolerance if attempt >= _REFINEMENTS else 0.0
-            mesh, many = mesh.refined(np.maximum(errors[: mesh.h_s.size], least), tolerance), 1
-        states, errors = yield from self.stepping(x, mesh, valve, p)
-        return states, errors, mesh, 1
-
     def stepping(
         self, x: np.ndarray, mesh: Mesh, valve: np.ndarray, p: np.ndarray
     ) -> Search[tuple[np.ndarray, np.ndarray]]:
-        """Do what `steps` does, as a search: see `together` for many at once."""
-        got = yield StepRequest(self.kernel, x, mesh, valve, p)
-        if not np.isfinite(got.states[:, -1]).all():
-            bad = int(np.argmax(~np.isfinite(got.states).all(axis=0)))
-            raise NoAnswerError(
-                f"the simulated motion of robot '{self.robot.name}' becomes non-finite "
-                f"{mesh.h_s[:bad].sum():.3g} s into a cycle: "
-                "check pressure, masses, time constants and effect sizes"
-            )
-        return got.states, got.error_m_s
+        """Do what `steps` does, as a search: see `run_batched` for many at once."""
+        try:
+            return (yield from finite_steps(StepRequest(self.kernel, x, mesh, valve, p)))
+        except NonFiniteMotionError as error:
+            raise self._non_finite(error) from None
+
+    def _non_finite(self, error: NonFiniteMotionError) -> NoAnswerError:
+        return NoAnswerError(
+            f"the simulated motion of robot '{self.robot.name}' becomes non-finite {error.time_s:.3g} s "
+            "into a cycle: check pressure, masses, time constants and effect sizes"
+        )
 
 
 def _runs_of_alike(pieces: list[Timeline]) -> list[tuple[Timeline, bytes, int]]:
@@ -249,8 +247,9 @@ def _runs_of_alike(pieces: list[Timeline]) -> list[tuple[Timeline, bytes, int]]:
     return runs
 
 
-def _pieces(timeline: Timeline, pressure_kpa: np.ndarray, longest_phases: int = 400) -> list[Timeline]:
+def _pieces(timeline: Timeline, pressure_kpa: np.ndarray) -> list[Timeline]:
     """Cut a timeline where pressure or frequency change, and at cycle ends, so that meshes can be reused."""
+    longest_phases = INTEGRATION.longest_phases
     alike = (pressure_kpa == pressure_kpa[0]).all() and (
         timeline.frequency_hz == timeline.frequency_hz[0]
     ).all()

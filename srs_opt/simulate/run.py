@@ -15,7 +15,7 @@ from srs_opt.result import Result
 from srs_opt.robot import Robot
 from srs_opt.simulate import compiled
 from srs_opt.simulate.cycle_motion import CycleMotion, cycle_motion
-from srs_opt.simulate.integrate import TOLERANCE_M_S, Integrator, Trajectory
+from srs_opt.simulate.integrate import INTEGRATION, Integrator, Trajectory
 from srs_opt.simulate.shapes import centre_lines
 from srs_opt.simulate.timeline import Timeline
 
@@ -162,7 +162,7 @@ def _error_estimate(run: Integrator, start: np.ndarray, gait: Gait, duration_s: 
     """Return the relative change of the path's length when a stretch is integrated again, finer."""
     stretch = Timeline.of_gait(gait, min(duration_s, _CHECKED_CYCLES * gait.period_s))
     usual = run.integrate(stretch, start)
-    finer = run.integrate(stretch, start, TOLERANCE_M_S / 16)
+    finer = run.integrate(stretch, start, INTEGRATION.tolerance_m_s / 16)
     distance = float(np.hypot(*np.diff(finer.pose[:, :2], axis=0).T).sum())
     if distance < 1e-6:
         return None

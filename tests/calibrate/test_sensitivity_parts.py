@@ -11,8 +11,7 @@ from srs_opt.calibrate.initial_pose import initial_pose
 from srs_opt.calibrate.model import Model
 from srs_opt.calibrate.sensitivity import HAIR, variation
 from srs_opt.calibrate.trial_simulation import (
-    FINEST_M_S,
-    TOLERANCE_M_S,
+    TRIAL,
     _fitted,
     conditions_of,
     tolerance_for,
@@ -99,10 +98,10 @@ def test_slopes_of_a_calibration_are_exact(setting):
 
 
 def test_more_data_ask_for_a_finer_simulation():
-    assert tolerance_for(1000, 0.001) == TOLERANCE_M_S
-    assert tolerance_for(60_000, 0.001) == pytest.approx(TOLERANCE_M_S / 2)
-    assert tolerance_for(60_000, 0.0005) == pytest.approx(TOLERANCE_M_S / 4)
-    assert tolerance_for(10**9, 1e-6) == FINEST_M_S
+    assert tolerance_for(1000, 0.001) == TRIAL.tolerance_m_s
+    assert tolerance_for(60_000, 0.001) == pytest.approx(TRIAL.tolerance_m_s / 2)
+    assert tolerance_for(60_000, 0.0005) == pytest.approx(TRIAL.tolerance_m_s / 4)
+    assert tolerance_for(10**9, 1e-6) == TRIAL.finest_m_s
 
 
 def test_a_mesh_serves_the_same_phases_as_it_is():
