@@ -24,7 +24,8 @@ from planners.motion.transitions import (
 )
 from planners.motion.valves import DEFAULT_LIMITS, SETTLE_S, STAIR_S, ValveLimits
 from srs_opt.files import atomic_path
-from srs_opt.gait_opt.robust import LEAST_SD, stiffness_deviation
+from srs_opt.gait_opt.robust import stiffness_deviation
+from srs_opt.gait_opt.settings import STIFFNESS
 from srs_opt.gait_opt.table import GaitTable
 from srs_opt.robot import Robot
 from srs_opt.simulate.compiled import cache_folder
@@ -64,7 +65,7 @@ def load_motion(
 
 def _load_deviation(robot: Robot, table: GaitTable, key: str) -> NDArray[np.float64] | None:
     """Return what `cycle_deviation_m` finds, cached as the motion table is."""
-    if stiffness_deviation(robot) < LEAST_SD:
+    if stiffness_deviation(robot) < STIFFNESS.least_sd:
         return None
     cached = cache_folder() / f"deviation_{key}_{stiffness_deviation(robot):.4g}_{_equations_digest()}.npz"
     try:

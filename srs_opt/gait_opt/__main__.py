@@ -21,6 +21,7 @@ from srs_opt.command import (
     say,
 )
 from srs_opt.errors import InputError
+from srs_opt.gait_opt.table_settings import TABLE
 
 if TYPE_CHECKING:
     from srs_opt.gait_opt.collocation.problem import CycleProblem
@@ -205,10 +206,9 @@ def softened(options: argparse.Namespace, robots: list[Robot]) -> list[Robot]:
 
 def limits_from(options: argparse.Namespace) -> Limits:
     """Return the limits that the options describe."""
-    from srs_opt.gait_opt.family import TABLE_PRESSURE_KPA
     from srs_opt.gait_opt.goal import Limits
 
-    pressure = options.pressure or (TABLE_PRESSURE_KPA if options.table else (41.0, 55.0))
+    pressure = options.pressure or (TABLE.pressure_kpa if options.table else (41.0, 55.0))
     return Limits(
         tuple(options.frequency),
         tuple(pressure),

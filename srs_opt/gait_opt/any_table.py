@@ -7,12 +7,13 @@ from pathlib import Path
 
 from srs_opt.gait_opt.catalogue import cached_table_path, known_table
 from srs_opt.gait_opt.entries import certified_table
-from srs_opt.gait_opt.family import TABLE_PRESSURE_KPA, build_table
+from srs_opt.gait_opt.family import build_table
 from srs_opt.gait_opt.goal import Limits
 from srs_opt.gait_opt.robust import in_the_middle, of_stiffness
 from srs_opt.gait_opt.robust_table import chosen_table
-from srs_opt.gait_opt.softness import MOST_LINKS, STIFFNESSES_N_M2
+from srs_opt.gait_opt.settings import STIFFNESS
 from srs_opt.gait_opt.table import GaitTable, save_table
+from srs_opt.gait_opt.table_settings import TABLE
 from srs_opt.robot import Robot
 
 Say = Callable[[str], None]
@@ -20,7 +21,7 @@ Say = Callable[[str], None]
 
 def usual(limits: Limits) -> bool:
     """Whether these are the limits of default tables."""
-    return limits == Limits(pressure_kpa=TABLE_PRESSURE_KPA)
+    return limits == Limits(pressure_kpa=TABLE.pressure_kpa)
 
 
 def unknown_stiffness(robot: Robot) -> bool:
@@ -28,19 +29,20 @@ def unknown_stiffness(robot: Robot) -> bool:
 
     Not robots with more links than the compliant model is compiled for in reasonable time.
     """
-    return not robot.is_soft and robot.links <= MOST_LINKS
+    return not robot.is_soft and robot.links <= STIFFNESS.most_links
 
 
 def of_any_stiffness(robot: Robot) -> tuple[Robot, ...]:
     """Return the bodies that a table for an unknown stiffness serves, that of the table's motions first."""
-    return in_the_middle([of_stiffness(robot, ei) for ei in STIFFNESSES_N_M2])
+    return in_the_middle([of_stiffness(robot, ei) for ei in STIFFNESS.silicone_n_m2])
 
 
 def unknown_words(robot: Robot) -> str:
     """Say whom the table serves, and how to ask for another."""
     return (
         f"robot '{robot.name}' gives no bending stiffness: the table serves all of "
-        f"{', '.join(f'{ei:g}' for ei in STIFFNESSES_N_M2)} N m^2; for one that is rigid: --model complex"
+        f"{', '.join(f'{ei:g}' for ei in STIFFNESS.silicone_n_m2)} N m^2; for one that is rigid: "
+        "--model complex"
     )
 
 

@@ -10,6 +10,7 @@ from srs_opt.errors import InputError
 from srs_opt.gait_opt.goal import Limits
 from srs_opt.gait_opt.robust import stiffness_deviation, stiffness_interval
 from srs_opt.gait_opt.table import GaitTable, load_table, save_table
+from srs_opt.gait_opt.table_settings import TABLE
 from srs_opt.robot import Robot, wpi_srs
 
 SHIPPED = "wpi_srs_table.json"
@@ -75,13 +76,12 @@ def _whole_table(robot: Robot, model: str, say: Callable[[str], None] | None) ->
         return table
     tell = say or (lambda text: None)
     if model == "compliant":
-        from srs_opt.gait_opt.family import TABLE_PRESSURE_KPA
         from srs_opt.gait_opt.robust_table import chosen_table
 
         rigid = robot.with_values(bending_stiffness_n_m2=None, gap_stiffness_n_m2=None)
         basis = _whole_table(rigid, "complex", say)
         tell("choosing gaits for this stiffness (once per robot)")
-        limits = Limits(pressure_kpa=TABLE_PRESSURE_KPA)
+        limits = Limits(pressure_kpa=TABLE.pressure_kpa)
         table = chosen_table(stiffness_interval(robot), model, basis, limits, say=tell)
     else:
         from srs_opt.gait_opt.family import build_table

@@ -10,15 +10,9 @@ import numpy as np
 from srs_opt.effects import known_effects
 from srs_opt.gait import Gait
 from srs_opt.gait_opt.collocation.problem import CycleProblem
-from srs_opt.gait_opt.goal import (
-    FREQUENCY_EXCESS,
-    LEAST_TURN_RAD_S,
-    STRAIGHT_RAD_S,
-    TURN_ERROR,
-    Goal,
-    Limits,
-)
+from srs_opt.gait_opt.goal import Goal, Limits
 from srs_opt.gait_opt.score import broken_constraints, evaluated, robot_scores
+from srs_opt.gait_opt.settings import GOAL
 from srs_opt.geometry import distance_along
 from srs_opt.model.state import FORWARD, SIDEWAYS, YAW_MOMENTUM
 from srs_opt.orbit.attractors import other_orbits
@@ -255,8 +249,9 @@ def _certified(
     )  # fmt: skip
 
 
-def standing_start(robot: Robot, gait: Gait, model: str, cycles: int = DEFAULT_CERTIFICATE.cycles) -> float:
-    """Return the mean speed (m/s) over the last of `cycles` cycles from rest."""
+def standing_start(robot: Robot, gait: Gait, model: str, cycles: int | None = None) -> float:
+    """Return the mean speed (m/s) over the last of `cycles` cycles from rest (None: the certificate's)."""
+    cycles = DEFAULT_CERTIFICATE.cycles if cycles is None else cycles
     run = _undelayed(robot, model)
     path = run.integrate(Timeline.of_gait(gait, cycles * gait.period_s), run.rest())
     return motion_of_cycle(run, path, gait, cycles - 1).speed_m_s
@@ -268,10 +263,9 @@ def _undelayed(robot: Robot, model: str) -> Integrator:
     return integrator(replace(robot, valve_delay_s=0.0, effects=own), model)
 
 
-def periodicity_gap(
-    robot: Robot, gait: Gait, model: str, orbit: Orbit, cycles: int = DEFAULT_CERTIFICATE.cycles
-) -> float:
+def periodicity_gap(robot: Robot, gait: Gait, model: str, orbit: Orbit, cycles: int | None = None) -> float:
     """Return by how much velocity and shape change over simulated cycles, relative to their size."""
+    cycles = DEFAULT_CERTIFICATE.cycles if cycles is None else cycles
     start = orbit.solution.start
     run = _undelayed(robot, model)
     x = run.integrate(Timeline.of_gait(gait, cycles * gait.period_s), start).final
@@ -291,15 +285,15 @@ def _ranges_left(limits: Limits, gait: Gait) -> list[str]:
             ("frequency", gait.frequency_hz, limits.frequency_hz, "Hz"),
             ("pressure", gait.pressure_kpa, limits.pressure_kpa, "kPa"),
         )
-        if not low * (1 - FREQUENCY_EXCESS) <= value <= high * (1 + FREQUENCY_EXCESS)
+        if not low * (1 - GOAL.frequency_excess) <= value <= high * (1 + GOAL.frequency_excess)
     ]
 
 
 def _curvature_exceeded(limits: Limits, orbit: Orbit, settings: CertificateSettings) -> list[str]:
-    most, bend = limits.max_curvature_1_m, float(np.abs(orbit.kappa).max())
-    if most is None or bend <= most * (1 + settings.limit_excess):
+    most, largest = limits.max_curvature_1_m, float(np.abs(orbit.kappa).max())
+    if most is None or largest <= most * (1 + settings.limit_excess):
         return []
-    return [f"curvature reaches {bend:.2f} 1/m, limit {most:g}"]
+    return [f"curvature reaches {largest:.2f} 1/m, limit {most:g}"]
 
 
 def _targets_missed(goal: Goal, orbit: Orbit, settings: CertificateSettings) -> list[str]:
@@ -317,17 +311,19 @@ def _targets_missed(goal: Goal, orbit: Orbit, settings: CertificateSettings) -> 
 def _turn_missed(goal: Goal, orbit: Orbit) -> list[str]:
     turn, radius = orbit.turn_rate_rad_s, orbit.radius_m
     if goal.radius_m is not None:
-        if radius is not None and abs(radius - goal.radius_m) <= TURN_ERROR * abs(goal.radius_m):
+        if radius is not None and abs(radius - goal.radius_m) <= GOAL.turn_error * abs(goal.radius_m):
             return []
         found = "none (straight)" if radius is None else f"{radius:.4f} m"
         return [f"wanted radius {goal.radius_m:g} m, simulated {found}"]
     if goal.turn_rate_rad_s is not None:
-        if abs(turn - goal.turn_rate_rad_s) <= max(TURN_ERROR * abs(goal.turn_rate_rad_s), STRAIGHT_RAD_S):
+        if abs(turn - goal.turn_rate_rad_s) <= max(
+            GOAL.turn_error * abs(goal.turn_rate_rad_s), GOAL.straight_rad_s
+        ):
             return []
         return [f"wanted turn rate {goal.turn_rate_rad_s:g} rad/s, simulated {turn:.3f}"]
-    if goal.turn == "side" and goal.sense * turn < LEAST_TURN_RAD_S * (1 - TURN_ERROR):
+    if goal.turn == "side" and goal.sense * turn < GOAL.least_turn_rad_s * (1 - GOAL.turn_error):
         return [f"the gait should turn {goal.side} but turns at {turn:+.3f} rad/s (+ is left)"]
-    if goal.turn == "straight" and abs(turn) > STRAIGHT_RAD_S:
+    if goal.turn == "straight" and abs(turn) > GOAL.straight_rad_s:
         return [f"the gait should run straight but turns at {turn:.3f} rad/s"]
     return []
 

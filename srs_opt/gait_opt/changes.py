@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from srs_opt.errors import InputError
+from srs_opt.gait_opt.table_settings import TABLE
 
 LEVELS = 3  # speeds: two forecast 2.5 m of changing gaits to 0.15 m, three to 0.03 m, four no better
 STEP_M, STEP_RAD, STEP_M_S = 1e-4, 1e-3, 1e-3  # of the integers that files hold
@@ -24,9 +25,6 @@ UNITS = (STEP_M, STEP_M, STEP_RAD, STEP_M_S)
 WEIGHT_STEPS = 1024  # of an interpolation weight: controllers have no fractions
 WEIGHTS = (-512, 1536)  # a speed beyond the levels is extrapolated by half a step at most
 MOST = 32767
-# Of a gait's steady motion beside its next cycle, where one is chosen: with less a controller that is asked
-# for the same motion all the time changes between gaits whose first cycles correct each other.
-STEADY_WEIGHT = 4
 
 
 class Moved(NamedTuple):
@@ -132,7 +130,7 @@ class Changes:
             way = math.isqrt(steps[0] ** 2 + steps[1] ** 2) * (1 if steps[0] >= 0 else -1)
             per_s = round(period_s * 1e6)
             off = _divided(way * 1000000, per_s) - speed, _divided(swung * 1000000, per_s) - turn
-            miss = off[0] ** 2 + off[1] ** 2 + STEADY_WEIGHT * round((off_m_s / STEP_M) ** 2)
+            miss = off[0] ** 2 + off[1] ** 2 + TABLE.steady_weight * round((off_m_s / STEP_M) ** 2)
             if miss < least:
                 best, least = number, miss
         return best

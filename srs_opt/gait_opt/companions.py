@@ -9,12 +9,11 @@ from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait, Wave
 from srs_opt.gait_opt.corrections import duty_biased, end_for_end, in_step
 from srs_opt.gait_opt.table import GaitTable, TableGait
+from srs_opt.gait_opt.table_settings import COMPANION
 from srs_opt.orbit.steady import steady_gait
 from srs_opt.robot import Robot
 
 TICK_S = 0.001
-OFFSETS = (0.0, 0.15, 0.3, 0.45, 0.6, 0.7, 0.8, 0.9)
-SLOWEST_M_S = 0.03
 
 
 def duty_biased_family(robot: Robot, gait: Gait, model: str = "complex") -> GaitTable:
@@ -50,7 +49,7 @@ def _family(robot: Robot, leaning: Callable[[float], Gait], model: str) -> GaitT
         except NoAnswerError:
             continue
         entry = TableGait.of_orbit(name, orbit)
-        if abs(entry.speed_m_s) > SLOWEST_M_S:
+        if abs(entry.speed_m_s) > COMPANION.slowest_m_s:
             entries.append(entry)
     return GaitTable(robot.name, robot.fingerprint(), model, tuple(entries))
 
@@ -63,7 +62,7 @@ def duty_biased_gaits(gait: Gait, tick_s: float) -> list[tuple[str, Gait]]:
 def _gaits(leaning: Callable[[float], Gait], tick_s: float) -> list[tuple[str, Gait]]:
     return [
         (f"{offset:+g}{way}", in_step(turned(leaning(offset)), tick_s))
-        for offset in [sign * size for size in OFFSETS for sign in ((1, -1) if size else (1,))]
+        for offset in [sign * size for size in COMPANION.offsets for sign in ((1, -1) if size else (1,))]
         for way, turned in (("", _unchanged), (" back", end_for_end))
     ]
 

@@ -25,20 +25,15 @@ from srs_opt.gait_opt.collocation.layout import Mesh
 from srs_opt.gait_opt.collocation.problem import CycleProblem
 from srs_opt.gait_opt.collocation.program import Program, Solution
 from srs_opt.gait_opt.score import Score, score
+from srs_opt.gait_opt.search_settings import CONTINUATION
+from srs_opt.gait_opt.settings import COLLOCATION
 from srs_opt.orbit.steady import Orbit, steady_gait
 from srs_opt.robot import Robot
 
-_FREQUENCY_REACH = 3.0  # per switch reach, Hz
-_PRESSURE_REACH = 4.0  # per switch reach, units of 50 kPa
 _PATIENT = {"mu_strategy": "monotone", "mu_init": 1e-3, "max_iter": 80}
 # simulation judges every solve: where nothing but the speed counts, a rough optimum soon is worth more than a
 # sharp one late; turns and bands get stuck that way
 _QUICK = {"mu_strategy": "monotone", "mu_init": 1e-4, "tol": 1e-3, "max_iter": 40}
-# the tightest turn lies far from every start: there, solves may wander through what is no motion
-_ROAMING = {**_PATIENT, "theta_max_fact": 1e4}
-_QUICK_ELEMENTS, _FINEST_QUICK = ((0.1, 24), (0.03, 28), (0.01, 36), (0.004, 50)), 60
-_UNIFORM_SHARE = 0.5  # of the mesh; the rest follows the simulation's steps
-_STATE_LIMIT = 4.0  # scaled states stay below
 
 
 @dataclass(frozen=True)
@@ -130,7 +125,9 @@ def _quick_stages(own_m_s: float, reach: float) -> tuple[Stage, ...]:
         speeds.append(own_m_s)
     stages = []
     for v in speeds:
-        elements = next((n for least, n in _QUICK_ELEMENTS if v >= least), _FINEST_QUICK)
+        elements = next(
+            (n for least, n in CONTINUATION.quick_elements if v >= least), CONTINUATION.finest_quick_elements
+        )
         stiff = v < 0.01
         stages.append(Stage(v, elements, reach / 2 if stiff else reach, 2 if stiff else 4, quick=True))
     return tuple(stages)
@@ -228,7 +225,7 @@ def mesh_for(orbits: tuple[Orbit, ...], elements: int) -> Mesh:
 def elements_until(orbits: tuple[Orbit, ...], elements: int) -> tuple[np.ndarray, np.ndarray]:
     """Return fractions of the cycle after the first switch and how many elements should end before each."""
     grid = np.linspace(0.0, 1.0, 1001)
-    level = elements * _UNIFORM_SHARE * grid
+    level = elements * CONTINUATION.uniform_share * grid
     for orbit in orbits:
         gait = orbit.gait
         times = orbit.time_s / gait.period_s
@@ -237,7 +234,7 @@ def elements_until(orbits: tuple[Orbit, ...], elements: int) -> tuple[np.ndarray
         shifted = np.interp(
             grid + first, np.concatenate([grid, grid[1:] + 1]), np.concatenate([count, count[1:] + 1])
         )
-        level = level + elements * (1 - _UNIFORM_SHARE) / len(orbits) * (shifted - shifted[0])
+        level = level + elements * (1 - CONTINUATION.uniform_share) / len(orbits) * (shifted - shifted[0])
     return grid, level * elements / level[-1]
 
 
@@ -257,7 +254,9 @@ def solve_from(
     parameters = problem.parameters(p, mesh, scales, stage.friction_speed_m_s, worth.scale)
     z[p.layout.merit] = worth.merit / worth.scale
     unknowns, rows, binding = bounded(problem, p, z, reach)
-    options = _QUICK if stage.quick else _ROAMING if problem.goal.turn == "side" else _PATIENT
+    options: dict[str, Any] = _QUICK if stage.quick else _PATIENT
+    if problem.goal.turn == "side" and not stage.quick:
+        options = {**options, "theta_max_fact": COLLOCATION.roaming_factor}
     solution = p.solve(z, parameters, unknowns, rows, options=options, solver=problem.solver)
     return solution, p, binding(solution.z)
 
@@ -269,13 +268,13 @@ def bounded(
     (low, high), rows = problem.bounds(p)
     part = slice(0, 2 + p.layout.switches)
     span = np.full(2 + p.layout.switches, reach)
-    span[0], span[1] = _FREQUENCY_REACH * reach, _PRESSURE_REACH * reach
+    span[0], span[1] = CONTINUATION.frequency_reach_hz * reach, CONTINUATION.pressure_reach * reach
     limit_low, limit_high = low[part].copy(), high[part].copy()
     low[part] = np.clip(z[part] - span, limit_low, limit_high)
     high[part] = np.clip(z[part] + span, limit_low, limit_high)
     for r in range(len(problem.robots)):
         states = p.layout.states(r)
-        low[states], high[states] = -_STATE_LIMIT, _STATE_LIMIT
+        low[states], high[states] = -CONTINUATION.state_limit, CONTINUATION.state_limit
 
     def binding(found: np.ndarray) -> bool:
         margin = 1e-3 * span

@@ -10,9 +10,7 @@ import numpy as np
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait
 from srs_opt.gait_opt.goal import Limits
-
-_LARGEST_BIAS = 0.35  # cycles by which on-intervals may grow at the expense of off-intervals
-_LEAST_SHARE = 0.04  # of a cycle, that any interval keeps
+from srs_opt.gait_opt.settings import DUTY_BIAS
 
 
 def duty_biased(gait: Gait, cycles: float) -> Gait:
@@ -27,7 +25,7 @@ def duty_biased(gait: Gait, cycles: float) -> Gait:
         for (_, off), (on, _) in zip(pairs, (*pairs[1:], pairs[0]))
     ]
     room = min(gaps) / period - cycles  # several intervals of a segment must not meet
-    if shortest + cycles < _LEAST_SHARE or longest + cycles > 1 - _LEAST_SHARE or room <= 0:
+    if shortest + cycles < DUTY_BIAS.least_share or longest + cycles > 1 - DUTY_BIAS.least_share or room <= 0:
         raise NoAnswerError("the duty bias is too large: valves would hardly switch")
     pairs = tuple(
         tuple(((on - change) % period, (off + change) % period) for on, off in pairs)
@@ -36,11 +34,13 @@ def duty_biased(gait: Gait, cycles: float) -> Gait:
     return replace(gait, intervals=pairs)
 
 
-def steered(gait: Gait, miss: Callable[[Gait], float], tolerance: float, most: float = _LARGEST_BIAS) -> Gait:
+def steered(gait: Gait, miss: Callable[[Gait], float], tolerance: float, most: float | None = None) -> Gait:
     """Return the gait duty-biased so that ``miss(gait)``, which grows with turning left, is zero.
 
-    The nearest miss is returned where zero is out of reach, the gait itself where it has no steady state.
+    `most` bounds the bias, in cycles (by default `DUTY_BIAS.largest_bias`). The nearest miss is returned
+    where zero is out of reach, the gait itself where it has no steady state.
     """
+    most = DUTY_BIAS.largest_bias if most is None else most
     tried: dict[float, float] = {}
 
     def at(bias: float) -> float:
@@ -54,7 +54,7 @@ def steered(gait: Gait, miss: Callable[[Gait], float], tolerance: float, most: f
     if np.isnan(at(0.0)) or abs(at(0.0)) <= tolerance:  # without a steady state there is nothing to steer by
         return gait
     direction = -np.sign(at(0.0))
-    below, step = 0.0, 0.02
+    below, step = 0.0, DUTY_BIAS.first_step
     while abs(below) < most:
         above = below + direction * step
         value = at(above)
@@ -62,7 +62,7 @@ def steered(gait: Gait, miss: Callable[[Gait], float], tolerance: float, most: f
             break
         if value * at(below) <= 0:
             return duty_biased(gait, _bisected(at, below, above, tolerance))
-        below, step = above, 1.5 * step
+        below, step = above, DUTY_BIAS.step_growth * step
     known = {k: abs(v) for k, v in tried.items() if not np.isnan(v)}
     best = min(known, key=known.__getitem__)
     return duty_biased(gait, best) if best else gait
@@ -70,7 +70,7 @@ def steered(gait: Gait, miss: Callable[[Gait], float], tolerance: float, most: f
 
 def _bisected(at: Callable[[float], float], a: float, b: float, tolerance: float) -> float:
     """Return a root between a and b (regula falsi with halving, so that rugged functions are fine)."""
-    for k in range(12):
+    for k in range(DUTY_BIAS.most_bisections):
         fa, fb = at(a), at(b)
         c = (a + b) / 2 if k % 3 == 2 or fa == fb else a - fa * (b - a) / (fb - fa)
         fc = at(c)

@@ -15,21 +15,12 @@ import numpy as np
 
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait, Wave
-from srs_opt.gait_opt.goal import STRAIGHT_RAD_S, Limits
-from srs_opt.gait_opt.table import LEVER_M, NEAR_M_S, TableGait
+from srs_opt.gait_opt.goal import Limits
+from srs_opt.gait_opt.settings import GOAL
+from srs_opt.gait_opt.table import TableGait
+from srs_opt.gait_opt.table_settings import DRIVER_GAIT, TABLE
 from srs_opt.orbit.steady import Orbit, steady_gaits
 from srs_opt.robot import Robot
-
-# m/s and rad/s, forward and to the left; the images are the rest. Steps are such that what lies between two
-# wishes is no farther than `NEAR_M_S` from one of them.
-SLOW_M_S = (0.02, 0.05, 0.1, 0.15)
-TURNS = ((0.05, 0.5), *((v, w) for v in (0.1, 0.2) for w in (0.5, 1.0, 1.5, 2.0)), (0.35, 0.5))
-PIVOTS_RAD_S = (0.3, 0.6, 1.0, 1.5)
-MISS_M_S = NEAR_M_S / 2  # an entry that misses by more is left out
-POOL, PARENTS, CHILDREN, GENERATIONS = 600, 8, 32, 14
-NEAR_ENOUGH_M_S, LEAST_GENERATIONS = 0.004, 5  # then breeding ends
-SPREAD, DECADES = 0.3, 1.5  # of mutations: largest, as a share of a parameter's range; over how many decades
-BAND_WEIGHT = 0.05  # m/s per metre of band: a slimmer gait is better, the motion counts first
 
 
 @dataclass(frozen=True)
@@ -48,11 +39,13 @@ class Motion:
         return f"slow {self.speed_m_s:g}{turn}"
 
 
-WANTED = (
-    *(Motion(v, 0.0) for v in SLOW_M_S),
-    *(Motion(v, w) for v, w in TURNS),
-    *(Motion(0.0, w) for w in PIVOTS_RAD_S),
-)
+def wanted_motions() -> tuple[Motion, ...]:
+    """Return what a table for drivers is to hold, forward and to the left; the images are the rest."""
+    return (
+        *(Motion(v, 0.0) for v in DRIVER_GAIT.slow_m_s),
+        *(Motion(v, w) for v, w in DRIVER_GAIT.turns),
+        *(Motion(0.0, w) for w in DRIVER_GAIT.pivots_rad_s),
+    )
 
 
 def driver_gaits(
@@ -62,7 +55,7 @@ def driver_gaits(
     images: Callable[[str, Gait], list[TableGait]],
     say: Callable[[str], None] = lambda text: None,
     *,
-    wanted: Sequence[Motion] = WANTED,
+    wanted: Sequence[Motion] | None = None,
     jobs: int = 1,
     seed: int = 0,
 ) -> tuple[TableGait, ...]:
@@ -70,21 +63,23 @@ def driver_gaits(
 
     Parameters
     ----------
+    wanted : sequence of Motion, optional
+        Without, `wanted_motions`.
     images : callable
         (name, gait) -> the entry and its mirror images and reverses.
     """
-    breed = _Breed(robot, model, limits, jobs)
+    evolution = _Evolution(robot, model, limits, jobs)
     random = np.random.default_rng(seed)
-    pool = breed.simulated(random.uniform(size=(POOL, 2 * robot.segments + 2)))
+    pool = evolution.simulated(random.uniform(size=(DRIVER_GAIT.first_waves, 2 * robot.segments + 2)))
     found: list[TableGait] = []
-    for motion in wanted:
-        pool = breed.bred(pool, motion, random)  # what was bred for one motion may serve the next
+    for motion in wanted_motions() if wanted is None else wanted:
+        pool = evolution.extended(pool, motion, random)  # waves found for one motion may serve the next
         if not pool.orbits:
             say("no wave has a steady state: no slow gaits, no pivots")
             break
         best = min(pool.orbits, key=lambda orbit: _price(orbit, motion))
         gait, miss = best.gait, _miss(best, motion)
-        if miss > MISS_M_S:
+        if miss > TABLE.near_m_s / 2:
             say(f"{motion.name}: left out, the nearest gait misses by {miss:.3f} m/s")
             continue
         try:
@@ -99,51 +94,53 @@ def driver_gaits(
 
 
 @dataclass(frozen=True)
-class _Bred:
-    """Simulated waves: genes (n, genes) in [0, 1] with their orbits."""
+class _Waves:
+    """Simulated waves: parameters (n, 2 + 2 segments) in [0, 1] with their orbits."""
 
     genes: np.ndarray
     orbits: tuple[Orbit, ...]
 
 
 @dataclass(frozen=True)
-class _Breed:
+class _Evolution:
     robot: Robot
     model: str
     limits: Limits
     jobs: int
 
-    def simulated(self, genes: np.ndarray) -> _Bred:
+    def simulated(self, genes: np.ndarray) -> _Waves:
         """Return the waves of these genes that have a steady state."""
         gaits = [self._gait(g) for g in genes]
         known = [(g, gait) for g, gait in zip(genes, gaits) if gait is not None]
         orbits = steady_gaits(self.robot, [gait for _, gait in known], self.model, jobs=self.jobs)
         kept = [(g, o) for (g, _), o in zip(known, orbits) if not isinstance(o, NoAnswerError)]
         kept = [(g, o) for g, o in kept if o.largest_multiplier < 1]
-        return _Bred(np.array([g for g, _ in kept]), tuple(o for _, o in kept))
+        return _Waves(np.array([g for g, _ in kept]), tuple(o for _, o in kept))
 
-    def bred(self, pool: _Bred, wanted: Motion, random: np.random.Generator) -> _Bred:
-        """Return the pool and what was bred from it towards the wanted motion."""
+    def extended(self, pool: _Waves, wanted: Motion, random: np.random.Generator) -> _Waves:
+        """Return the pool with the offspring of a (mu + lambda) evolution towards the wanted motion."""
         straight = wanted.turn_rate_rad_s == 0
-        for generation in range(GENERATIONS):
+        for generation in range(DRIVER_GAIT.generations):
             if not pool.orbits:
                 break
             price = np.array([_price(orbit, wanted) for orbit in pool.orbits])
             if (
-                generation >= LEAST_GENERATIONS
-                and _miss(pool.orbits[price.argmin()], wanted) < NEAR_ENOUGH_M_S
+                generation >= DRIVER_GAIT.least_generations
+                and _miss(pool.orbits[price.argmin()], wanted) < DRIVER_GAIT.near_enough_m_s
             ):
                 break
-            parents = pool.genes[np.argsort(price)[:PARENTS]]
-            children = np.repeat(parents, -(-CHILDREN // len(parents)), axis=0)
-            spread = SPREAD * 10 ** (-DECADES * random.uniform(size=(len(children), 1)))
+            parents = pool.genes[np.argsort(price)[: DRIVER_GAIT.parents]]
+            children = np.repeat(parents, -(-DRIVER_GAIT.children // len(parents)), axis=0)
+            spread = DRIVER_GAIT.mutation * 10 ** (
+                -DRIVER_GAIT.mutation_decades * random.uniform(size=(len(children), 1))
+            )
             moved = random.uniform(size=children.shape) < random.uniform(0.2, 1.0, (len(children), 1))
             children = children + spread * moved * random.standard_normal(children.shape)
             if straight:
                 children[:, 2 + self.robot.segments :] = 0.5
-            born = self.simulated(np.clip(children, 0.0, 1.0))
-            if born.orbits:
-                pool = _Bred(np.concatenate([pool.genes, born.genes]), pool.orbits + born.orbits)
+            offspring = self.simulated(np.clip(children, 0.0, 1.0))
+            if offspring.orbits:
+                pool = _Waves(np.concatenate([pool.genes, offspring.genes]), pool.orbits + offspring.orbits)
         return pool
 
     def _gait(self, genes: np.ndarray) -> Gait | None:
@@ -160,10 +157,10 @@ class _Breed:
 
 def _miss(orbit: Orbit, wanted: Motion) -> float:
     off = orbit.turn_rate_rad_s - wanted.turn_rate_rad_s
-    return math.hypot(orbit.speed_m_s - wanted.speed_m_s, LEVER_M * off)
+    return math.hypot(orbit.speed_m_s - wanted.speed_m_s, TABLE.lever_m * off)
 
 
 def _price(orbit: Orbit, wanted: Motion) -> float:
-    if wanted.turn_rate_rad_s == 0 and abs(orbit.turn_rate_rad_s) > STRAIGHT_RAD_S:
-        return _miss(orbit, wanted) + 2 * MISS_M_S  # nearly straight is not straight
-    return _miss(orbit, wanted) + BAND_WEIGHT * sum(orbit.envelope_m)
+    if wanted.turn_rate_rad_s == 0 and abs(orbit.turn_rate_rad_s) > GOAL.straight_rad_s:
+        return _miss(orbit, wanted) + TABLE.near_m_s  # nearly straight is not straight
+    return _miss(orbit, wanted) + DRIVER_GAIT.wider_m_s_per_m * sum(orbit.envelope_m)

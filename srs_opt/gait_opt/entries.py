@@ -13,18 +13,19 @@ from srs_opt.errors import NoAnswerError
 from srs_opt.gait_opt.certificate import certify, self_clearance_m
 from srs_opt.gait_opt.collocation.problem import CycleProblem
 from srs_opt.gait_opt.corrections import in_step
-from srs_opt.gait_opt.goal import STRAIGHT_RAD_S, Goal, Limits
+from srs_opt.gait_opt.finish import quantized
+from srs_opt.gait_opt.goal import Goal, Limits
 from srs_opt.gait_opt.objectives.cycle import GaitCycle
 from srs_opt.gait_opt.objectives.objective import Objective
-from srs_opt.gait_opt.polish import quantized
+from srs_opt.gait_opt.settings import GOAL
 from srs_opt.gait_opt.switch_times import collocated_speeds
-from srs_opt.gait_opt.table import LEVER_M, EntryCertificate, GaitTable, TableGait
+from srs_opt.gait_opt.table import EntryCertificate, GaitTable, TableGait
+from srs_opt.gait_opt.table_settings import TABLE
 from srs_opt.parallel import executor
 from srs_opt.parallel.sweep import sweep
 from srs_opt.robot import Robot
 
 Say = Callable[[str], None]
-_BAND_WEIGHT = 2.0  # m/s per metre of band: 5 mm wider is as bad as 1 cm/s off
 
 # What a table says of a gait is its motion: whether that is what was wished for is decided before.
 _ANY_MOTION = Objective("entry", lambda cycle: cycle.speed_m_s, turn="any")
@@ -118,7 +119,7 @@ def _on_ticks(work: _Work, entry: TableGait) -> tuple[TableGait | None, str]:
         frequency_hz=(min(slow, gait.frequency_hz), max(fast, gait.frequency_hz)),
         pressure_kpa=(min(weak, gait.pressure_kpa), max(strong, gait.pressure_kpa)),
     )
-    straight = entry.radius_m is None or abs(entry.turn_rate_rad_s) < STRAIGHT_RAD_S
+    straight = entry.radius_m is None or abs(entry.turn_rate_rad_s) < GOAL.straight_rad_s
     like = Objective("entry", _likeness(entry), turn="any")
     goal = replace(Goal(like), turn_rate_rad_s=0.0) if straight else Goal(like)
     problem = CycleProblem((work.robot,), work.model, goal, wide)
@@ -138,7 +139,7 @@ def _likeness(entry: TableGait) -> Callable[[GaitCycle], ca.SX]:
 
     def merit(cycle: GaitCycle) -> ca.SX:
         wider = ca.fmax(cycle.band_m - band, 0)
-        off = ca.hypot(cycle.speed_m_s - speed, LEVER_M * (cycle.turn_rate_rad_s - turn))
-        return -off - _BAND_WEIGHT * wider
+        off = ca.hypot(cycle.speed_m_s - speed, TABLE.lever_m * (cycle.turn_rate_rad_s - turn))
+        return -off - TABLE.wider_m_s_per_m * wider
 
     return merit

@@ -15,20 +15,18 @@ from srs_opt.gait_opt.continuation import Continuation, Stage, continuation_stag
 from srs_opt.gait_opt.corrections import end_for_end, in_step
 from srs_opt.gait_opt.driver import driver_gaits
 from srs_opt.gait_opt.entries import certified_table
-from srs_opt.gait_opt.goal import LEAST_SPEED_M_S, STRAIGHT_RAD_S, Goal, Limits
-from srs_opt.gait_opt.polish import quantized
+from srs_opt.gait_opt.finish import quantized
+from srs_opt.gait_opt.goal import Goal, Limits
 from srs_opt.gait_opt.score import score
+from srs_opt.gait_opt.settings import GOAL
 from srs_opt.gait_opt.starts import best_start, plain_waves
 from srs_opt.gait_opt.table import GaitTable, TableGait
+from srs_opt.gait_opt.table_settings import TABLE
 from srs_opt.gait_opt.table_spec import TableSpec, generations, table_specs
 from srs_opt.orbit.steady import Orbit, steady_gait
 from srs_opt.parallel import executor
 from srs_opt.parallel.sweep import Resume, sweep
 from srs_opt.robot import Robot
-
-TABLE_PRESSURE_KPA = (20.0, 55.0)
-_BAND_EXCESS = 0.01
-_RADIUS_ERROR = 0.03
 
 
 @dataclass(frozen=True)
@@ -73,7 +71,7 @@ def build_table(
     NoAnswerError
         If no spec is within reach.
     """
-    work = Work(robot, model, limits or Limits(pressure_kpa=TABLE_PRESSURE_KPA))
+    work = Work(robot, model, limits or Limits(pressure_kpa=TABLE.pressure_kpa))
     kept = None if resume is None else Resume(resume, f"gait table {work}")
     frequency, pressure = work.limits.frequency_hz[1], work.limits.pressure_kpa[1]
     starts: dict[str | None, Gait] = {None: published_wave(robot, frequency, pressure).gait()}
@@ -137,15 +135,15 @@ def _fulfil(work: Work, task: Task) -> dict[str, Any]:
 
 def _kept(spec: TableSpec, entry: TableGait) -> bool:
     """Whether a gait is what was wished for, near enough."""
-    if entry.speed_m_s < LEAST_SPEED_M_S:
+    if entry.speed_m_s < GOAL.least_speed_m_s:
         return False
     if spec.load:  # asked for under load: without, it is what it is
-        return (spec.radius_m is None) == (abs(entry.turn_rate_rad_s) < STRAIGHT_RAD_S)
-    if spec.band_m is not None and sum(entry.envelope_m) > spec.band_m * (1 + _BAND_EXCESS):
+        return (spec.radius_m is None) == (abs(entry.turn_rate_rad_s) < GOAL.straight_rad_s)
+    if spec.band_m is not None and sum(entry.envelope_m) > spec.band_m * (1 + TABLE.band_excess):
         return False
     if spec.radius_m is None:
-        return entry.radius_m is None or abs(entry.turn_rate_rad_s) < STRAIGHT_RAD_S
-    return entry.radius_m is not None and abs(entry.radius_m / spec.radius_m - 1) < _RADIUS_ERROR
+        return entry.radius_m is None or abs(entry.turn_rate_rad_s) < GOAL.straight_rad_s
+    return entry.radius_m is not None and abs(entry.radius_m / spec.radius_m - 1) < TABLE.radius_error
 
 
 def _solve(problem: CycleProblem, task: Task) -> Continuation:
@@ -167,7 +165,7 @@ def _continued(problem: CycleProblem, start: Gait, spec: TableSpec) -> Continuat
     last = Stage(own, 70, 0.03, 2)
     found = run_stages(problem, start, (Stage(max(own, 0.004), 60, 0.06, 3), last))
     band = spec.band_m
-    if band is not None and (excess := sum(found.orbits[0].envelope_m) - band) > _BAND_EXCESS * band:
+    if band is not None and (excess := sum(found.orbits[0].envelope_m) - band) > TABLE.band_excess * band:
         # the mesh sees the body's reach at some instants only: ask for less by as much as it missed
         less = replace(problem, goal=replace(problem.goal, envelope_m=band - excess))
         again = run_stages(less, found.gait, (last,))
@@ -185,7 +183,7 @@ def images(robot: Robot, model: str, name: str, gait: Gait, tick_s: float) -> li
         return steady_gait(robot, in_step(image, tick_s), model)
 
     forward, backward = orbit(gait), orbit(end_for_end(gait))
-    straight = abs(forward.turn_rate_rad_s) < STRAIGHT_RAD_S
+    straight = abs(forward.turn_rate_rad_s) < GOAL.straight_rad_s
     made: list[tuple[str, Orbit]] = [(name if straight else f"{name} left", forward)]
     if not straight:
         made.append((f"{name} right", orbit(gait.mirrored())))

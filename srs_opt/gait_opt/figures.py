@@ -39,7 +39,7 @@ def convergence_figure(found: Found) -> Figure:
 
 @styled
 def pareto_figure(table: GaitTable) -> Figure:
-    """Show speed against the path's bend, forward gaits coloured by the width of their swept band."""
+    """Show speed against the path's curvature, forward gaits coloured by the width of their swept band."""
     figure, axes = new_figure(width_in=4.8, height_in=3.2)
     forward = [g for g in table.gaits if g.speed_m_s > 0]
     bend = [0.0 if g.radius_m is None else 1 / g.radius_m for g in forward]

@@ -14,15 +14,12 @@ from srs_opt.gait_opt.collocation.guess import unknowns_from_orbits
 from srs_opt.gait_opt.collocation.layout import PRESSURE_UNIT_KPA, Mesh
 from srs_opt.gait_opt.collocation.problem import CycleProblem
 from srs_opt.gait_opt.continuation import Stage, bounded, orbits_of, run_stages
-from srs_opt.gait_opt.polish import polished
+from srs_opt.gait_opt.finish import finished
 from srs_opt.gait_opt.score import score
 from srs_opt.gait_opt.search import HERE, Found, Where, search
+from srs_opt.gait_opt.search_settings import FREE_VALVES
 
-ELEMENTS = 40  # of the relaxed problem; valve levels have the same grid
-SMOOTHED_M_S = 0.01
 _IPOPT = {"mu_strategy": "monotone", "mu_init": 1e-2, "max_iter": 200}
-_PULLED = 0.8  # size of the first guess's valve levels, off their bounds
-_FINE = 25  # places per element for rounding
 
 
 @dataclass(frozen=True)
@@ -82,7 +79,7 @@ class FreeResult:
             "gain_beyond_frequency": best / fastest - 1,
             "rounded_speed_m_s": None if self.free is None else self.free.certificate.speed_m_s,
             "relaxed_speed_m_s": None if relaxation is None else relaxation.speed_m_s,
-            "relaxed_friction_speed_m_s": SMOOTHED_M_S,
+            "relaxed_friction_speed_m_s": FREE_VALVES.friction_speed_m_s,
             "intervals_after_rounding": list(self.rounded_intervals),
             "switches_per_s": self.found.gait.switches_per_s,
             "shortest_dwell_s": self.found.gait.shortest_dwell_s(),
@@ -125,7 +122,7 @@ def search_free(
         at_limits = 100 * np.mean(np.abs(relaxation.levels) > 0.95)
         say(
             f"valves relaxed to [-1, 1]: {relaxation.speed_m_s:.4f} m/s with friction smoothed at "
-            f"{SMOOTHED_M_S:g} m/s, {at_limits:.0f} % of the levels at their limits"
+            f"{FREE_VALVES.friction_speed_m_s:g} m/s, {at_limits:.0f} % of the levels at their limits"
         )
         gait, counts = rounded(relaxation, problem)
         own.append(gait)
@@ -177,10 +174,14 @@ def _total(problem: CycleProblem, found: Found) -> float:
 def _refined(problem: CycleProblem, gait: Gait, wave: Found, say: Callable[[str], None]) -> Found | None:
     """Take one on/off gait up the last stages and optimize its switch times exactly."""
     own = max(r.friction_speed_m_s for r in problem.robots)
-    stages = (Stage(SMOOTHED_M_S, 60, 0.05, 6), Stage(max(own, 0.004), 70, 0.03, 3), Stage(own, 80, 0.02, 2))
+    stages = (
+        Stage(FREE_VALVES.friction_speed_m_s, 60, 0.05, 6),
+        Stage(max(own, 0.004), 70, 0.03, 3),
+        Stage(own, 80, 0.02, 2),
+    )
     try:
         top = run_stages(problem, gait, stages)
-        exact, certificate, orbits = polished(problem, top.gait, 0.01)
+        exact, certificate, orbits = finished(problem, top.gait, 0.01)
     except NoAnswerError as error:
         say(f"a rounded gait was dropped: {error}")
         return None
@@ -214,17 +215,17 @@ def _wave_with_notches(problem: CycleProblem, gait: Gait) -> Gait:
 def relax(problem: CycleProblem, gait: Gait) -> Relaxation:
     """Return the optimum with valve levels in [-1, 1], from the neighbourhood of `gait`."""
     loose = replace(problem, relaxed=True)
-    mesh = Mesh.uniform(ELEMENTS)
-    p = loose.program(ELEMENTS)
-    orbits = orbits_of(problem, gait, SMOOTHED_M_S)
+    mesh = Mesh.uniform(FREE_VALVES.elements)
+    p = loose.program(FREE_VALVES.elements)
+    orbits = orbits_of(problem, gait, FREE_VALVES.friction_speed_m_s)
     z, scales = unknowns_from_orbits(p.layout, list(problem.robots), list(orbits), mesh)
     levels = slice(2, 2 + p.layout.switches)
-    z[levels] *= _PULLED
+    z[levels] *= FREE_VALVES.first_level
     z[p.layout.merit] = score(problem, gait, orbits).merit
     unknowns, rows, _ = bounded(loose, p, z, 2.0)
     solution = p.solve(
         z,
-        loose.parameters(p, mesh, scales, SMOOTHED_M_S),
+        loose.parameters(p, mesh, scales, FREE_VALVES.friction_speed_m_s),
         unknowns,
         rows,
         options=_IPOPT,
@@ -232,7 +233,7 @@ def relax(problem: CycleProblem, gait: Gait) -> Relaxation:
     )
     return Relaxation(
         float(solution.z[p.layout.unknown(0, "speed")]),
-        solution.z[levels].reshape(ELEMENTS, -1),
+        solution.z[levels].reshape(FREE_VALVES.elements, -1),
         float(solution.z[0]),
         float(PRESSURE_UNIT_KPA * solution.z[1]),
         solution.converged,
@@ -249,7 +250,7 @@ def rounded(relaxation: Relaxation, problem: CycleProblem) -> tuple[Gait, tuple[
     dwell = max(problem.limits.min_dwell_s, 2 * problem.limits.tick_s) / period
     rows, counts = [], []
     for levels in relaxation.levels.T:
-        on = sum_up(np.repeat(levels, _FINE))
+        on = sum_up(np.repeat(levels, FREE_VALVES.places))
         pulses = merged(intervals_of(on), 1.05 * dwell, problem.intervals)
         counts.append(len(pulses))
         pulses = notched(pulses, 1.5 * dwell, problem.intervals)

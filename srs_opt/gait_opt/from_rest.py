@@ -24,12 +24,7 @@ from srs_opt.gait_opt.continuation import Step, orbits_of
 from srs_opt.gait_opt.corrections import on_ticks
 from srs_opt.gait_opt.evolution import evolution
 from srs_opt.gait_opt.population import Coordinates, simulated_costs
-
-MISLED = 0.05  # collocation against simulation from rest: beyond, the collocated orbit was another one
-SPREAD_CYCLES = 0.02  # of the first generation's switches; half finds the start again, double is waste
-SPREAD_LIMITS = 0.15  # of frequency and pressure, in units of their limits' widths
-GENERATIONS, MEMBERS = 40, 12  # twice as many gain below 0.3 %
-_SETTLED = 3e-4  # of the merit: the search ends where generations differ by less
+from srs_opt.gait_opt.search_settings import FROM_REST
 
 
 @dataclass(frozen=True)
@@ -65,14 +60,14 @@ class FromRest:
 
 def misled(steps: Sequence[Step]) -> bool:
     """Whether some step's collocated orbit was not the one that its gait reaches from rest."""
-    return any(step.astray > MISLED for step in steps)
+    return any(step.astray > FROM_REST.misled for step in steps)
 
 
 def search_from_rest(problem: CycleProblem, gait: Gait, seed: int = 0) -> FromRest:
     """Return the best gait that CMA-ES finds about `gait`, which has one on-interval per segment."""
     at = Coordinates(problem)
     start = at.of(gait)
-    spread = np.where(np.arange(start.size) < 2, SPREAD_LIMITS, SPREAD_CYCLES)
+    spread = np.where(np.arange(start.size) < 2, FROM_REST.spread_limits, FROM_REST.spread_cycles)
     before = -simulated_costs(problem, [gait])[0]
     best, after, count = gait, before, 1
     limits = problem.limits
@@ -82,9 +77,9 @@ def search_from_rest(problem: CycleProblem, gait: Gait, seed: int = 0) -> FromRe
         start,
         spread,
         seed=np.random.default_rng(seed),
-        popsize=MEMBERS,
-        maxiter=GENERATIONS,
-        tolfun=_SETTLED,
+        popsize=FROM_REST.members,
+        maxiter=FROM_REST.generations,
+        tolfun=FROM_REST.settled,
     )
     try:
         for gaits, costs in generations:

@@ -10,16 +10,10 @@ from srs_opt.errors import InputError
 from srs_opt.gait_opt.objectives.built_in import SPEED
 from srs_opt.gait_opt.objectives.objective import Objective
 from srs_opt.gait_opt.objectives.registry import objective_named
+from srs_opt.gait_opt.settings import GOAL
 from srs_opt.robot import Robot
 
-LEAST_SPEED_M_S = 0.02  # of gaits whose objective alone would bring them to a stop
-LEAST_TURN_RAD_S = 0.05  # of a turn whose side is wanted and nothing else
-TURN_ERROR = 0.02  # share by which a wanted radius or turn rate may be missed
-STRAIGHT_RAD_S = 0.02  # turn rate below which a gait counts as straight
 SIDES = {"left": 1.0, "right": -1.0}
-FREQUENCY_EXCESS = 2e-3  # share by which a period of whole ticks may leave the frequency limits
-LEAST_TICKS = 4  # in a period: fewer hold no wave
-CHAMBER_OVER_WIDTH = 1 / 6  # assumed diameter of an air chamber over the body's width
 
 
 @dataclass(frozen=True)
@@ -117,7 +111,7 @@ class Goal:
         if self.speed_m_s:
             return self.speed_m_s
         if self.least_speed_m_s is None and self.aim.least_speed:
-            return LEAST_SPEED_M_S
+            return GOAL.least_speed_m_s
         return self.least_speed_m_s
 
     @property
@@ -171,10 +165,10 @@ class Limits:
                 raise InputError(f"{name} must be above 0 {unit}, found {value:g}")
         if not 0 <= self.min_dwell_s < math.inf:
             raise InputError(f"a dwell must be at least 0 s, found {self.min_dwell_s:g}")
-        if LEAST_TICKS * self.tick_s * slow > 1:
+        if GOAL.least_ticks * self.tick_s * slow > 1:
             raise InputError(
                 f"a tick of {self.tick_s:g} s is too long: the longest period, {1 / slow:g} s, must hold "
-                f"{LEAST_TICKS} of them at least"
+                f"{GOAL.least_ticks} of them at least"
             )
         least, most = tick_counts(self.frequency_hz, self.tick_s)
         if least > most:
@@ -197,13 +191,13 @@ class Limits:
 def tick_counts(frequency_hz: tuple[float, float], tick_s: float) -> tuple[int, int]:
     """Return the fewest and most whole ticks of a period within the frequency limits.
 
-    Where no whole number lies strictly within, `FREQUENCY_EXCESS` of the limits is used up.
+    Where no whole number lies strictly within, `GOAL.frequency_excess` of the limits is used up.
     """
     fewest, longest = 1 / frequency_hz[1] / tick_s, 1 / frequency_hz[0] / tick_s
     least, most = math.ceil(fewest - 1e-6), math.floor(longest + 1e-6)
     if least <= most:
         return least, most
-    return math.ceil(fewest / (1 + FREQUENCY_EXCESS)), math.floor(longest / (1 - FREQUENCY_EXCESS))
+    return math.ceil(fewest / (1 + GOAL.frequency_excess)), math.floor(longest / (1 - GOAL.frequency_excess))
 
 
 def chamber_volume_m3(robot: Robot) -> float:
@@ -211,7 +205,7 @@ def chamber_volume_m3(robot: Robot) -> float:
 
     The paper prints none; for the built-in robot this is 1.3 ml.
     """
-    bore = CHAMBER_OVER_WIDTH * robot.body_width_m
+    bore = GOAL.bore_over_width * robot.body_width_m
     return math.pi / 4 * bore**2 * robot.segment_length_m
 
 

@@ -21,18 +21,13 @@ from srs_opt.gait_opt.collocation.guess import gait_of, switches_of
 from srs_opt.gait_opt.collocation.problem import CycleProblem
 from srs_opt.gait_opt.evolution import evolution
 from srs_opt.gait_opt.score import score
+from srs_opt.gait_opt.search_settings import POPULATION
 from srs_opt.gait_opt.starts import starting_gaits
 from srs_opt.orbit.steady import Orbit, steady_gaits
 from srs_opt.parallel import executor
 from srs_opt.parallel.sweep import Resume, sweep
 
-SIZE = 20  # gaits per generation: the half finds the nearest optimum, the double takes twice the time
-EVALUATIONS = 3000  # gaits per population: what nine unknowns take to come to rest
-AGREED = 0.01  # share by which the scores of two populations differ that found the same
-_TOGETHER = 2  # populations between two looks at whether they agree, whatever runs them
 _OTHER_SEED = 1000
-_SPREAD = 0.2  # of the first generation, in units of the limits' widths and of the cycle
-_DONE = 1e-4  # spread of the scores at which a population has come to rest
 _NOTHING = 1e3  # cost of a gait without a steady state
 
 
@@ -92,12 +87,12 @@ def populations(
     They begin at other waves than the searches with the same seed.
     """
     kept = None if resume is None else Resume(resume, f"population {problem}")
-    begins = starting_gaits(problem, max(most, _TOGETHER) + 1, seed + _OTHER_SEED)[1:]
+    begins = starting_gaits(problem, max(most, POPULATION.together) + 1, seed + _OTHER_SEED)[1:]
     pieces = [(seed + k, start) for k, start in enumerate(begins)]
     totals: list[float] = []
-    for k in range(0, len(pieces), _TOGETHER):
+    for k in range(0, len(pieces), POPULATION.together):
         work = partial(_evolved, problem)
-        batch = pieces[k : k + _TOGETHER]
+        batch = pieces[k : k + POPULATION.together]
         with executor(jobs, cluster) as where:
             for record in sweep(work, batch, chunk=1, where=where, resume=kept):
                 gait = Gait.of_record(record["gait"])
@@ -105,14 +100,14 @@ def populations(
                 say(f"population {len(totals)}: score {totals[-1]:.4f}")
                 yield gait
         first, second = sorted(totals, reverse=True)[:2]
-        if first - second <= AGREED * abs(first):
+        if first - second <= POPULATION.agreement * abs(first):
             return
 
 
 def _evolved(problem: CycleProblem, pieces: Sequence[tuple[int, Gait]]) -> list[dict[str, Any]]:
     found = []
     for seed, start in pieces:
-        gait, total = evolved(problem, start, seed, EVALUATIONS)
+        gait, total = evolved(problem, start, seed, POPULATION.evaluations)
         found.append({"gait": gait.record(), "total": total})
     return found
 
@@ -133,11 +128,11 @@ def evolved(problem: CycleProblem, start: Gait, seed: int, evaluations: int) -> 
         lambda genes: [at.gait(x) for x in genes],
         partial(simulated_costs, problem),
         at.of(start),
-        _SPREAD,
+        POPULATION.spread,
         seed=seed + 1,
-        popsize=SIZE,
+        popsize=POPULATION.size,
         maxfevals=evaluations,
-        tolfun=_DONE,
+        tolfun=POPULATION.settled,
     )
     for gaits, costs in generations:
         k = int(np.argmin(costs))

@@ -10,9 +10,7 @@ import numpy as np
 from srs_opt.gait_opt.collocation.layout import ENVELOPE_UNIT_M, PRESSURE_UNIT_KPA
 from srs_opt.gait_opt.collocation.problem import CycleProblem
 from srs_opt.gait_opt.collocation.program import Program, Solution
-
-_AT_LIMIT = 1e-4  # share of a bound within which an unknown stands at it
-_NOTHING = 1e-6  # merit that is not worth a word
+from srs_opt.gait_opt.settings import REPORT
 
 
 @dataclass(frozen=True)
@@ -63,7 +61,7 @@ def prices(problem: CycleProblem, p: Program, solution: Solution, merit_unit: fl
     )
     for name, place, unit, (low, high), step, word in scaled:
         for which, bound, sign in (("least", low, -1.0), ("highest", high, 1.0)):
-            at_limit = abs(unit * z[place] - bound) < _AT_LIMIT * max(bound, 1.0)
+            at_limit = abs(unit * z[place] - bound) < REPORT.at_limit * max(bound, 1.0)
             if at_limit and low < high and sign * by_z[place] > 0:
                 found.append((f"the {which} {name}", sign * step, word, sign * step * by_z[place] / unit))
     speeds = [layout.unknown(r, "speed") for r in range(len(problem.robots))]
@@ -73,7 +71,7 @@ def prices(problem: CycleProblem, p: Program, solution: Solution, merit_unit: fl
         at = float(by_z[layout.unknown(0, "turn_rate")])
         found.append(("the wanted turn rate", float(np.sign(at)) * 0.1, "rad/s", 0.1 * abs(at)))
     found += _of_rows(problem, p, solution, merit_unit)
-    worth = [Price(*price, _words(problem, *price)) for price in found if price[3] > _NOTHING]
+    worth = [Price(*price, _words(problem, *price)) for price in found if price[3] > REPORT.least_price]
     return tuple(sorted(worth, key=lambda price: -price.merit))
 
 

@@ -8,14 +8,12 @@ from srs_opt.errors import NoAnswerError
 from srs_opt.gait_opt.collocation.guess import parameter_numbers
 from srs_opt.gait_opt.collocation.point import PointKind, linear_shape
 from srs_opt.gait_opt.collocation.problem import CycleProblem
+from srs_opt.gait_opt.settings import FEASIBILITY
 from srs_opt.model.parameters import Structure
 from srs_opt.model.registry import build
 from srs_opt.robot import Robot
 
-_INSTANTS = 200  # of the cycle at which curvature is looked at; half of them find the peak to 0.1 %
 _SHARES = np.linspace(0.3, 0.7, 41)  # of the time that a valve is on
-_SHARP = 1e-3  # half width of a switch, cycles
-_TOLERATED = 0.01  # share by which certificates let a limit be exceeded
 
 
 def refuse_contradictions(problem: CycleProblem) -> None:
@@ -31,7 +29,7 @@ def refuse_contradictions(problem: CycleProblem) -> None:
         return
     for robot in problem.robots:
         least = least_curvature_1_m(problem, robot)
-        if least is not None and most * (1 + _TOLERATED) < least:
+        if least is not None and most * (1 + FEASIBILITY.excess) < least:
             frequency, pressure = problem.limits.frequency_hz[1], problem.limits.pressure_kpa[0]
             who = f" of robot '{robot.name}'" if len(problem.robots) > 1 else ""
             raise NoAnswerError(
@@ -49,8 +47,8 @@ def least_curvature_1_m(problem: CycleProblem, robot: Robot) -> float | None:
     kind = PointKind(Structure.of(robot, problem.model, room=False), problem.intervals)
     if kind.structure.compliant or not build(kind.structure)[2].linear:
         return None
-    shape = linear_shape(kind, _INSTANTS)
-    at = np.arange(_INSTANTS)[None] / _INSTANTS
+    shape = linear_shape(kind, FEASIBILITY.instants)
+    at = np.arange(FEASIBILITY.instants)[None] / FEASIBILITY.instants
     numbers = parameter_numbers(robot, kind)
     k = problem.intervals
     (slow, fast), pressures = problem.limits.frequency_hz, problem.limits.pressure_kpa
@@ -60,6 +58,8 @@ def least_curvature_1_m(problem: CycleProblem, robot: Robot) -> float | None:
         switches = np.tile(np.concatenate([starts, starts + share / k]), kind.segments)
         for frequency in {slow, fast}:
             for pressure in set(pressures):
-                kappa = np.asarray(shape(switches, frequency, pressure, at, numbers, _SHARP)[0])
+                kappa = np.asarray(
+                    shape(switches, frequency, pressure, at, numbers, FEASIBILITY.switch_half_width)[0]
+                )
                 best = np.minimum(best, np.abs(kappa).max(axis=1))
     return float(best.max())

@@ -6,10 +6,9 @@ from dataclasses import replace
 
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait_opt.table import GaitTable, TableGait
+from srs_opt.gait_opt.table_settings import TABLE
 from srs_opt.orbit.steady import steady_gaits
 from srs_opt.robot import Robot
-
-SLOWEST_M_S = 0.01  # a gait that creeps serves no plan
 
 
 def replayed(robot: Robot, table: GaitTable, model: str | None = None, *, jobs: int = 1) -> GaitTable:
@@ -27,7 +26,7 @@ def replayed(robot: Robot, table: GaitTable, model: str | None = None, *, jobs: 
         for entry, orbit in zip(table.gaits, orbits)
         if not isinstance(orbit, NoAnswerError)
         and orbit.largest_multiplier < 1
-        and abs(orbit.speed_m_s) > SLOWEST_M_S
+        and abs(orbit.speed_m_s) > TABLE.slowest_replayed_m_s
     )
     if not gaits:
         raise NoAnswerError(f"robot '{robot.name}' does not move with any gait of '{table.robot_name}'")

@@ -11,12 +11,12 @@ from srs_opt.gait_opt.goal import Limits
 from srs_opt.gait_opt.robust import published_orbit
 from srs_opt.gait_opt.score import transport_cost
 from srs_opt.gait_opt.search import Found
-from srs_opt.gait_opt.softness import STIFFNESSES_N_M2, robust_beside, speeds_at_stiffness
+from srs_opt.gait_opt.settings import REPORT, STIFFNESS
+from srs_opt.gait_opt.softness import robust_beside, speeds_at_stiffness
 from srs_opt.gait_opt.table import GaitTable
 from srs_opt.robot import Robot
 
 _PRICES_TOLD = 4  # the dearest limits; the JSON has all
-_NOTHING_BEYOND = 0.5  # % of speed that rounding and the search's tolerance explain
 
 
 def wave_parameters(gait: Gait) -> tuple[list[float], list[float]] | None:
@@ -106,7 +106,7 @@ def soft_speeds(robot: Robot, gait: Gait, beside: Limits | None) -> dict[str, An
     own, *robust = speeds_at_stiffness(robot, gaits)
 
     def listed(speeds: list[float | None]) -> list[dict[str, float | None]]:
-        return [{"ei_n_m2": ei, "speed_m_s": speed} for ei, speed in zip(STIFFNESSES_N_M2, speeds)]
+        return [{"ei_n_m2": ei, "speed_m_s": speed} for ei, speed in zip(STIFFNESS.silicone_n_m2, speeds)]
 
     return {
         "speed_at_stiffness": listed(own),
@@ -245,7 +245,7 @@ def _freed(free: dict[str, Any] | None) -> list[str]:
         f"{fastest['frequency_hz']:.2f} Hz, {fastest['repeats']} times per cycle, makes "
         f"{fastest['speed_m_s']:.4f} m/s: "
     )
-    if beyond < _NOTHING_BEYOND:
+    if beyond < REPORT.least_gain_percent:
         return [line + "more intervals buy nothing beyond a higher limit on the frequency"]
     return [line + f"beyond a higher limit on the frequency, more intervals buy {beyond:.1f} %"]
 

@@ -9,12 +9,9 @@ from dataclasses import replace
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait import published_wave
 from srs_opt.gait_opt.collocation.problem import CycleProblem
+from srs_opt.gait_opt.settings import STIFFNESS
 from srs_opt.orbit.steady import Orbit, steady_gait
 from srs_opt.robot import Robot
-
-INTERVAL_SD = 2.0  # standard deviations to either side that a stiffness known with one stands for
-LEAST_SD = 0.02  # speeds within 4 % of a stiffness hardly differ: then one body is enough
-_LEAST_M_S = 1e-3  # published speed below which nothing can be said relative to it
 
 
 def of_stiffness(robot: Robot, ei_n_m2: float) -> Robot:
@@ -36,12 +33,12 @@ def stiffness_interval(robot: Robot) -> tuple[Robot, ...]:
     """Return the robot with its own stiffness and with those at the ends of what it may be.
 
     These are two standard deviations of its logarithm away (`Robot.relative_sd`); the robot alone where the
-    file has no deviation, or one below `LEAST_SD`.
+    file has no deviation, or one below `STIFFNESS.least_sd`.
     """
     key, sd = stiffness_key(robot), stiffness_deviation(robot)
-    if sd < LEAST_SD:
+    if sd < STIFFNESS.least_sd:
         return (robot,)
-    reach, ei = math.exp(INTERVAL_SD * sd), getattr(robot, key)
+    reach, ei = math.exp(STIFFNESS.interval_sd * sd), getattr(robot, key)
     what = "gap EI" if key == "gap_stiffness_n_m2" else "EI"
     return robot, *(
         robot.with_values(**{key: value, "name": f"{robot.name}, {what} {value:g} N m^2"})
@@ -77,7 +74,7 @@ def in_the_middle(robots: Sequence[Robot]) -> tuple[Robot, ...]:
     nominal = order.pop(len(order) // 2)
     stiffnesses = [robot.bending_stiffness_n_m2 or math.inf for robot in robots]
     reach = max(abs(math.log(ei / (nominal.bending_stiffness_n_m2 or math.inf))) for ei in stiffnesses)
-    deviations = {**nominal.relative_sd, "bending_stiffness_n_m2": reach / INTERVAL_SD}
+    deviations = {**nominal.relative_sd, "bending_stiffness_n_m2": reach / STIFFNESS.interval_sd}
     return nominal.with_values(relative_sd=deviations), *order
 
 
@@ -101,7 +98,7 @@ def relative(problem: CycleProblem) -> CycleProblem:
     speeds = []
     for robot in problem.robots:
         speeds.append(published_orbit(problem, robot).speed_m_s)
-        if speeds[-1] < _LEAST_M_S:
+        if speeds[-1] < STIFFNESS.least_published_m_s:
             raise NoAnswerError(
                 f"the published gait makes {speeds[-1]:.4f} m/s on robot '{robot.name}', nothing to compare "
                 "with: use --worst absolute"

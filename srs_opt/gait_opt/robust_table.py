@@ -16,10 +16,11 @@ from srs_opt.errors import InputError, NoAnswerError
 from srs_opt.gait import Gait, published_wave
 from srs_opt.gait_opt.companions import duty_biased_gaits
 from srs_opt.gait_opt.corrections import on_ticks
-from srs_opt.gait_opt.goal import STRAIGHT_RAD_S, Limits
-from srs_opt.gait_opt.replayed import SLOWEST_M_S
+from srs_opt.gait_opt.goal import Limits
+from srs_opt.gait_opt.settings import GOAL
 from srs_opt.gait_opt.softness import robust_beside
 from srs_opt.gait_opt.table import GaitTable, TableGait
+from srs_opt.gait_opt.table_settings import TABLE
 from srs_opt.orbit.steady import Orbit, steady_gait, steady_gaits
 from srs_opt.robot import Robot
 
@@ -113,10 +114,10 @@ def _allowed(gait: Gait, limits: Limits) -> bool:
 def _alike(orbits: tuple[Orbit | NoAnswerError, ...]) -> list[Orbit]:
     """Return the orbits if all are stable and move on the same way and to the same side; else none."""
     moving = [orbit for orbit in orbits if not isinstance(orbit, NoAnswerError)]
-    good = [o for o in moving if o.largest_multiplier < 1 and abs(o.speed_m_s) >= SLOWEST_M_S]
+    good = [o for o in moving if o.largest_multiplier < 1 and abs(o.speed_m_s) >= TABLE.slowest_replayed_m_s]
     ways = {(o.speed_m_s > 0, _side(o.turn_rate_rad_s)) for o in good}
     return good if len(good) == len(orbits) and len(ways) == 1 else []
 
 
 def _side(turn_rate_rad_s: float) -> int:
-    return 0 if abs(turn_rate_rad_s) < STRAIGHT_RAD_S else int(np.sign(turn_rate_rad_s))
+    return 0 if abs(turn_rate_rad_s) < GOAL.straight_rad_s else int(np.sign(turn_rate_rad_s))

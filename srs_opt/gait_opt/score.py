@@ -9,17 +9,13 @@ import numpy as np
 from srs_opt.gait import Gait
 from srs_opt.gait_opt.collocation.guess import switches_of
 from srs_opt.gait_opt.collocation.problem import CycleProblem, weight_n
-from srs_opt.gait_opt.goal import LEAST_TURN_RAD_S, Goal, air_work_j
+from srs_opt.gait_opt.goal import air_work_j
 from srs_opt.gait_opt.objectives.built_in import TRANSPORT
 from srs_opt.gait_opt.objectives.cycle import SAMPLES
 from srs_opt.gait_opt.objectives.objective import Objective, formulas
+from srs_opt.gait_opt.settings import GOAL, SCORE
 from srs_opt.orbit.steady import Orbit
 from srs_opt.simulate.interpolate import linear
-
-_PENALTY = 5.0
-_LEVER_M = 0.1
-_SLOW = 0.1  # merit (m/s, where speed counts) below which tolerances shrink with it
-_LEAST_SCALE = 0.01
 
 
 @dataclass(frozen=True)
@@ -32,12 +28,12 @@ class Score:
     @property
     def total(self) -> float:
         """Merit less a penalty for misses: what gaits are compared by."""
-        return self.merit - _PENALTY * self.miss
+        return self.merit - SCORE.miss_weight * self.miss
 
     @property
     def scale(self) -> float:
         """What tolerances on the merit are multiplied by: 1, less for a robot that hardly moves."""
-        return float(np.clip(abs(self.merit) / _SLOW, _LEAST_SCALE, 1.0))
+        return float(np.clip(abs(self.merit) / SCORE.small_merit, SCORE.least_scale, 1.0))
 
 
 def score(problem: CycleProblem, gait: Gait, orbits: tuple[Orbit, ...]) -> Score:
@@ -53,7 +49,7 @@ def robot_scores(problem: CycleProblem, gait: Gait, orbits: tuple[Orbit, ...]) -
         merit, rows = evaluated(problem, problem.goal.aim, gait, r, orbit)
         own = sum(over for _, over in broken_constraints(problem, rows))
         found.append(
-            Score(problem.weight(r) * merit, _miss(problem.goal, orbit) + _limits_miss(problem, orbit) + own)
+            Score(problem.weight(r) * merit, _miss(problem, r, orbit) + _limits_miss(problem, orbit) + own)
         )
     return tuple(found)
 
@@ -88,21 +84,22 @@ def transport_cost(problem: CycleProblem, gait: Gait, robot: int, orbit: Orbit) 
     return -evaluated(problem, TRANSPORT, gait, robot, orbit)[0]
 
 
-def _miss(goal: Goal, orbit: Orbit) -> float:
+def _miss(problem: CycleProblem, robot: int, orbit: Orbit) -> float:
     """Return by how much a robot misses speed and turn, as shares of a typical motion."""
+    goal, lever = problem.goal, SCORE.lever * problem.robots[robot].length_m
     turn, floor = orbit.turn_rate_rad_s, goal.floor_m_s
     missed = 0.0
     if goal.turn == "side":
-        missed += _LEVER_M * max(LEAST_TURN_RAD_S - goal.sense * turn, 0.0)
+        missed += lever * max(GOAL.least_turn_rad_s - goal.sense * turn, 0.0)
     elif goal.radius_m is not None:
-        missed += _LEVER_M * abs(turn - orbit.speed_m_s / goal.radius_m)
+        missed += lever * abs(turn - orbit.speed_m_s / goal.radius_m)
     elif goal.turn != "any":
-        missed += _LEVER_M * abs(turn - (goal.turn_rate_rad_s or 0.0))
+        missed += lever * abs(turn - (goal.turn_rate_rad_s or 0.0))
     return missed if floor is None else missed + max(1 - orbit.speed_m_s / floor, 0.0)
 
 
 def _limits_miss(problem: CycleProblem, orbit: Orbit) -> float:
-    """Return by how much the swept band (10 for a metre) and the curvature (1 for all of it) are exceeded."""
+    """Return by how much the swept band and the curvature (1 for all of it) are exceeded."""
     band, most = problem.goal.envelope_m, problem.limits.max_curvature_1_m
-    over = 0.0 if band is None else 10 * max(sum(orbit.envelope_m) - band, 0.0)
+    over = 0.0 if band is None else SCORE.band_miss_per_m * max(sum(orbit.envelope_m) - band, 0.0)
     return over if most is None else over + max(float(np.abs(orbit.kappa).max()) / most - 1, 0.0)

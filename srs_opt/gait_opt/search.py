@@ -22,13 +22,14 @@ from srs_opt.gait_opt.continuation import (
     run_stages,
 )
 from srs_opt.gait_opt.corrections import within
+from srs_opt.gait_opt.finish import finished
 from srs_opt.gait_opt.from_rest import FromRest, misled, search_from_rest
 from srs_opt.gait_opt.goal import Goal
-from srs_opt.gait_opt.polish import polished
 from srs_opt.gait_opt.population import populations
 from srs_opt.gait_opt.prices import Price
 from srs_opt.gait_opt.reach import refuse_contradictions
 from srs_opt.gait_opt.score import Score, score
+from srs_opt.gait_opt.search_settings import GAIT_SEARCH
 from srs_opt.gait_opt.starts import starting_gaits, turned
 from srs_opt.orbit.steady import Orbit
 from srs_opt.parallel import executor
@@ -39,13 +40,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Say = Callable[[str], None]
-_CARRIED = 2  # starts that are carried to the robot's own friction
-_ALIKE = 1e-3  # merits closer than this are one optimum
-_EXACT_REACH = 0.01  # cycles that the switches may move in the last stage
-_NEAR_REACH, _MOVED_REACH = 0.05, 0.02  # the same for earlier results that keep the new limits, or do not
-_BEYOND = 0.03  # share by which a wanted speed may exceed the fastest gait's before it is refused at once
-_SCATTER = 0.03  # share by which the best start may exceed the second: more, and the search goes on
-_KEPT = 5e-3  # miss below which a gait keeps the limits
 _MOVED = Stage(0.01, 36, 0.1, 2, quick=True)  # friction that forgives, for results that had to move
 
 
@@ -162,12 +156,12 @@ def search(
         stages = () if _rugged(problem) else continuation_stages(own, quick=problem.goal.only_fast)
         cut = max(len([r for r in stages if r.friction_speed_m_s >= 0.01]), len(stages) - 2)
         lower, upper = stages[:cut], stages[cut:]
-        reach = _EXACT_REACH
+        reach = GAIT_SEARCH.exact_reach
     else:
         start, near = _warmed(problem, warm, say)
         candidates, lower = [start], ()
         upper = () if near else (replace(_MOVED, friction_speed_m_s=max(own, _MOVED.friction_speed_m_s)),)
-        reach = _NEAR_REACH if near else _MOVED_REACH
+        reach = GAIT_SEARCH.near_reach if near else GAIT_SEARCH.moved_reach
     continuing = _Continuing(problem, len(candidates), say)
     continued, interrupted = _all(continuing, list(enumerate(candidates)), lower, where)
     if not continued:
@@ -175,7 +169,7 @@ def search(
             raise KeyboardInterrupt
         raise NoAnswerError("no start converged to a steady gait within the limits")
     if not interrupted:
-        chosen = _distinct(continued)[:_CARRIED]
+        chosen = _distinct(continued)[: GAIT_SEARCH.carried_starts]
         carried, interrupted = _all(continuing, [(k, continued[k].gait) for k in chosen], upper, where)
         for k, top in carried.items():
             continued[k] = replace(top, steps=(*continued[k].steps, *top.steps))
@@ -194,7 +188,7 @@ def search(
         say("collocation found orbits that are not reached from rest: searching by simulation from rest")
         settled = search_from_rest(problem, reached, seed)
         reached, interrupted = settled.gait, settled.interrupted
-    exact, certificate, orbits = polished(problem, reached, reach, _reporter(say, best, len(candidates)))
+    exact, certificate, orbits = finished(problem, reached, reach, _reporter(say, best, len(candidates)))
     if warm is not None and not certificate.passed and not interrupted:
         say(f"no valid gait near the earlier one ({certificate.failures[0]}): running the whole search")
         return search(problem, starts, seed, say, where=where)
@@ -221,7 +215,7 @@ def _rugged(problem: CycleProblem) -> bool:
 def _scatter(continued: dict[int, Continuation]) -> bool:
     """Whether several starts led somewhere and no second one confirms the best."""
     totals = sorted((c.score.total for c in continued.values()), reverse=True)
-    return len(totals) > 1 and totals[0] - totals[1] > _SCATTER * abs(totals[0])
+    return len(totals) > 1 and totals[0] - totals[1] > GAIT_SEARCH.scatter * abs(totals[0])
 
 
 def _evolved(
@@ -254,7 +248,7 @@ def _warmed(problem: CycleProblem, warm: Gait, say: Say) -> tuple[Gait, bool]:
         say(f"the earlier gait turns away from the {goal.side}: using its mirror image")
         warm = warm.mirrored()
     start = within(problem.limits, warm)
-    if start == warm and score(problem, warm, orbits_of(problem, warm)).miss < _KEPT:
+    if start == warm and score(problem, warm, orbits_of(problem, warm)).miss < GAIT_SEARCH.kept_miss:
         return warm, True
     return turned(problem, start), False
 
@@ -268,7 +262,7 @@ def _refuse_out_of_reach(
     if fastest.interrupted:
         raise KeyboardInterrupt
     slowest = min(fastest.certificate.robots, key=lambda r: r.speed_m_s)
-    if speed_m_s > (1 + _BEYOND) * slowest.speed_m_s:
+    if speed_m_s > (1 + GAIT_SEARCH.beyond_fastest) * slowest.speed_m_s:
         who = f" with robot '{slowest.name}'" if len(problem.robots) > 1 else ""
         raise NoAnswerError(
             f"no gait makes {speed_m_s:g} m/s{who}: the fastest that was found within these limits runs at "
@@ -323,7 +317,9 @@ def _distinct(continued: dict[int, Continuation]) -> list[int]:
     kept: list[int] = []
     for k in sorted(continued, key=lambda k: -continued[k].score.total):
         mine = continued[k].score
-        if all(abs(mine.total - continued[j].score.total) > _ALIKE * mine.scale for j in kept):
+        if all(
+            abs(mine.total - continued[j].score.total) > GAIT_SEARCH.same_optimum * mine.scale for j in kept
+        ):
             kept.append(k)
     return kept
 

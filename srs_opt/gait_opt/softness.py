@@ -10,22 +10,21 @@ from srs_opt.gait import Gait
 from srs_opt.gait_opt.corrections import within
 from srs_opt.gait_opt.goal import Limits
 from srs_opt.gait_opt.robust import of_stiffness
+from srs_opt.gait_opt.settings import STIFFNESS
 from srs_opt.orbit.steady import steady_gaits
 from srs_opt.robot import Robot
 
-STIFFNESSES_N_M2 = (0.02, 0.005, 0.002)  # what silicone segments of the built-in robot's size may have
-MOST_LINKS = 12  # compiling the compliant model of longer robots takes minutes
-
 
 def speeds_at_stiffness(robot: Robot, gaits: list[Gait]) -> list[list[float | None]]:
-    """Return the speeds from rest (m/s) of every gait at `STIFFNESSES_N_M2`; None where it has no steady one.
+    """Return the speeds from rest (m/s) of every gait at the stiffnesses of silicone.
 
-    Empty lists for a robot that has a stiffness of its own, or too many links.
+    They are `STIFFNESS.silicone_n_m2`; None where a gait has no steady motion. Empty lists for a robot that
+    has a stiffness of its own, or too many links.
     """
-    if robot.is_soft or robot.links > MOST_LINKS:
+    if robot.is_soft or robot.links > STIFFNESS.most_links:
         return [[] for _ in gaits]
     found: list[list[float | None]] = [[] for _ in gaits]
-    for ei in STIFFNESSES_N_M2:
+    for ei in STIFFNESS.silicone_n_m2:
         for speeds, orbit in zip(found, steady_gaits(of_stiffness(robot, ei), gaits)):
             speeds.append(None if isinstance(orbit, NoAnswerError) else orbit.speed_m_s)
     return found
@@ -33,7 +32,7 @@ def speeds_at_stiffness(robot: Robot, gaits: list[Gait]) -> list[list[float | No
 
 @lru_cache(maxsize=1)
 def robust_gait() -> Gait:
-    """Return the gait with the best worst speed, relative to the published gait, over `STIFFNESSES_N_M2`.
+    """Return the gait with the best worst speed, relative to the published gait, over silicone's stiffnesses.
 
     It was found for the built-in robot's segments at 1 to 2 Hz and 41 to 55 kPa.
     """

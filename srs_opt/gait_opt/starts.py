@@ -16,12 +16,8 @@ from srs_opt.gait_opt.continuation import orbits_of
 from srs_opt.gait_opt.corrections import steered
 from srs_opt.gait_opt.goal import Goal
 from srs_opt.gait_opt.score import score
+from srs_opt.gait_opt.settings import START
 from srs_opt.orbit.steady import steady_gait
-
-_SMOOTHED_M_S = 0.1
-_AIM_RAD_S = 0.02
-_STEERED_RAD_S = 0.5  # turn rate from which searches for tight turns and pivots start
-_PRESSURE_SHARES, _WAVES_ON_BODY = (0.45, 0.55, 0.7, 0.85, 1.0), (0.7, 0.85)
 
 
 def starting_gaits(problem: CycleProblem, count: int, seed: int) -> list[Gait]:
@@ -50,16 +46,16 @@ def starting_gaits(problem: CycleProblem, count: int, seed: int) -> list[Gait]:
 def turned(problem: CycleProblem, gait: Gait) -> Gait:
     """Return the gait duty-biased towards the wanted turn, as far as smoothed friction lets it."""
     goal = problem.goal
-    robot = replace(problem.robots[0], friction_speed_m_s=_SMOOTHED_M_S)
+    robot = replace(problem.robots[0], friction_speed_m_s=START.friction_speed_m_s)
     if goal.turn == "side":
-        turn = goal.sense * _STEERED_RAD_S
-        if goal.sense * steady_gait(robot, gait, problem.model).turn_rate_rad_s >= _STEERED_RAD_S:
+        turn = goal.sense * START.steered_rad_s
+        if goal.sense * steady_gait(robot, gait, problem.model).turn_rate_rad_s >= START.steered_rad_s:
             return gait
         return steered(gait, lambda g: steady_gait(robot, g, problem.model).turn_rate_rad_s - turn, 0.1)
     if goal.radius_m is None and not goal.turn_rate_rad_s:
         return gait
     try:
-        return steered(gait, turn_miss(problem, _SMOOTHED_M_S), 0.05)
+        return steered(gait, turn_miss(problem, START.friction_speed_m_s), 0.05)
     except NoAnswerError:
         return gait
 
@@ -76,7 +72,7 @@ def best_start(problem: CycleProblem, gaits: Sequence[Gait]) -> Gait:
     for k, start in enumerate(gaits):
         with suppress(NoAnswerError):
             if problem.goal.radius_m is not None:
-                start = steered(start, turn_miss(problem), _AIM_RAD_S)
+                start = steered(start, turn_miss(problem), START.turn_tolerance_rad_s)
             found.append((score(problem, start, orbits_of(problem, start)).total, -k, start))
     if not found:
         raise NoAnswerError("no starting gait reaches a steady motion")
@@ -90,8 +86,8 @@ def plain_waves(problem: CycleProblem) -> list[Gait]:
     """
     robot, limits = problem.robots[0], problem.limits
     least, most = limits.pressure_kpa
-    pressures = [share * most for share in _PRESSURE_SHARES if share * most >= least]
-    lags = [waves * 2 * math.pi / robot.links for waves in _WAVES_ON_BODY]
+    pressures = [share * most for share in START.pressure_shares if share * most >= least]
+    lags = [waves * 2 * math.pi / robot.links for waves in START.waves_on_body]
     return [
         Wave.uniform(robot.segments, limits.frequency_hz[1], pressure, lag).gait()
         for pressure in pressures

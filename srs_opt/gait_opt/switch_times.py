@@ -19,6 +19,7 @@ from srs_opt.gait_opt.collocation.refine import defects, refined_cuts
 from srs_opt.gait_opt.continuation import Report, Stage, Step, bounded, elements_until, orbits_of
 from srs_opt.gait_opt.prices import Price, prices
 from srs_opt.gait_opt.score import Score, score
+from srs_opt.gait_opt.search_settings import SWITCH_TIMES
 from srs_opt.orbit.steady import Orbit
 from srs_opt.simulate.cycle_motion import STRAIGHT_RADIUS_M
 
@@ -28,16 +29,10 @@ _IPOPT = {
     "tol": 1e-5,
 }  # fmt: skip
 _MOTION = ("speed", "turn_rate")
-_ROUNDS = 6
-_ELEMENTS = 90
-_MOST_ELEMENTS = 160
-_DEFECT = 5e-3  # tolerated between nodes, over the states' sizes
-_GAINED = 1e-5
-_TOLERATED_LOSS = 1e-3
 
 
 @dataclass(frozen=True)
-class Polished:
+class ExactSwitchTimes:
     """The result: gait, its orbits and score, the robots' speeds by the last good solve, the steps,
     what the limits cost there."""
 
@@ -51,7 +46,7 @@ class Polished:
 
 def optimize_switch_times(
     problem: CycleProblem, gait: Gait, reach: float = 0.02, report: Report | None = None
-) -> Polished:
+) -> ExactSwitchTimes:
     """Return the gait with locally optimal switch times, frequency and pressure.
 
     Each round solves one fixed order of switches on one mesh, within reach; where that binds, the next
@@ -65,8 +60,8 @@ def optimize_switch_times(
     steps: list[Step] = []
     cost: tuple[Price, ...] = ()
     order = switch_order(_switches(gait))
-    cuts = phase_cuts(_switches(gait), order, *elements_until(orbits, _ELEMENTS))
-    for _ in range(_ROUNDS):
+    cuts = phase_cuts(_switches(gait), order, *elements_until(orbits, SWITCH_TIMES.elements))
+    for _ in range(SWITCH_TIMES.rounds):
         trial, step, speeds, met, finer, binding, active = _solve(problem, gait, orbits, order, cuts, reach)
         try:
             trial_orbits = orbits_of(problem, trial)
@@ -77,14 +72,14 @@ def optimize_switch_times(
         step = replace(step, simulated_m_s=trial_orbits[0].speed_m_s)
         steps.append(step)
         gain = found.total - best.total
-        if not step.trouble and gain > -_TOLERATED_LOSS * best.scale:
+        if not step.trouble and gain > -SWITCH_TIMES.loss * best.scale:
             claimed, cost = speeds, active
         if gain > 0:
             gait, orbits, best = trial, trial_orbits, found
         if report is not None:
             report(step, best)
         settled = met is None and finer is cuts and not step.trouble
-        if settled and (gain <= _GAINED * best.scale or not binding):
+        if settled and (gain <= SWITCH_TIMES.gain * best.scale or not binding):
             break
         cuts = finer
         if gain > 0 and met is not None:
@@ -94,7 +89,7 @@ def optimize_switch_times(
             reach /= 3
         if gain > 0 and binding:
             reach *= 2
-    return Polished(gait, orbits, best, claimed, tuple(steps), cost)
+    return ExactSwitchTimes(gait, orbits, best, claimed, tuple(steps), cost)
 
 
 def collocated_speeds(problem: CycleProblem, gait: Gait) -> tuple[float, ...] | None:
@@ -104,7 +99,7 @@ def collocated_speeds(problem: CycleProblem, gait: Gait) -> tuple[float, ...] | 
     """
     orbits = orbits_of(problem, gait)
     order = switch_order(_switches(gait))
-    cuts = phase_cuts(_switches(gait), order, *elements_until(orbits, _MOST_ELEMENTS))
+    cuts = phase_cuts(_switches(gait), order, *elements_until(orbits, SWITCH_TIMES.most_elements))
     mesh, times = phase_times(_switches(gait), order, cuts)
     p = problem.program(mesh.elements, times)
     z, scales = unknowns_from_orbits(p.layout, list(problem.robots), list(orbits), mesh)
@@ -186,7 +181,7 @@ def _solve(
         explained(p, solution, trial), mesh.elements, float(defect.max()),
     )  # fmt: skip
     finer = cuts
-    if mesh.elements < _MOST_ELEMENTS and defect.max() > _DEFECT:
-        finer = refined_cuts(defect, cuts, _DEFECT)
+    if mesh.elements < SWITCH_TIMES.most_elements and defect.max() > SWITCH_TIMES.defect:
+        finer = refined_cuts(defect, cuts, SWITCH_TIMES.defect)
     met = exchanged(solution.z[2 : 2 + p.layout.switches], order)
     return trial, step, speeds, met, finer, binding(solution.z), prices(problem, p, solution, worth.scale)

@@ -15,6 +15,7 @@ from srs_opt.errors import InputError
 from srs_opt.files import write_text
 from srs_opt.gait import Gait
 from srs_opt.gait_opt.changes import Changes, Moved
+from srs_opt.gait_opt.table_settings import TABLE, TableSettings
 from srs_opt.orbit.steady import Orbit
 from srs_opt.result import Result
 from srs_opt.robot import Robot
@@ -23,9 +24,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 VERSION = 1
-# Half the step between the table's speeds; half of it refuses what is nearly there, double plays what is not.
-NEAR_M_S = 0.05
-LEVER_M = 0.1  # turn rates weigh as speeds at this distance, half the built-in robot's length
 
 
 @dataclass(frozen=True)
@@ -211,8 +209,8 @@ class GaitTable(Result):
         start = self.changes.rest if before is None else self.gaits.index(self[before])
         near = [
             (number, self.gaits[number].gait.period_s, float(off))
-            for number, off in enumerate(self._off(speed_m_s, turn_rate_rad_s, LEVER_M))
-            if off <= NEAR_M_S and (speed_m_s != 0 or turn_rate_rad_s != 0)
+            for number, off in enumerate(self._off(speed_m_s, turn_rate_rad_s, TABLE.lever_m))
+            if off <= TABLE.near_m_s and (speed_m_s != 0 or turn_rate_rad_s != 0)
         ]
         best = self.changes.nearest(near, start, begun_m_s, (speed_m_s, turn_rate_rad_s))
         return None if best is None else self.gaits[best]
@@ -221,19 +219,19 @@ class GaitTable(Result):
         self,
         speed_m_s: float,
         turn_rate_rad_s: float,
-        lever_m: float = LEVER_M,
-        tolerance_m_s: float = NEAR_M_S,
+        settings: TableSettings = TABLE,
     ) -> TableGait | None:
-        """Return the gait nearest to a wanted motion; turn rates weigh `lever_m` against speeds.
+        """Return the gait nearest to a wanted motion; turn rates count as speeds at `settings.lever_m`.
 
-        None, which is to vent, for standing still and where no gait is within `tolerance_m_s`: a robot that
-        is asked to turn on the spot must not shoot ahead. `srs_nearest` of the firmware answers the same.
+        None, which is to vent, for standing still and where no gait is within `settings.near_m_s`: a robot
+        that is asked to turn on the spot must not shoot ahead. `srs_nearest` of the firmware answers the
+        same.
         """
         if speed_m_s == 0 and turn_rate_rad_s == 0:
             return None
-        distance = self._off(speed_m_s, turn_rate_rad_s, lever_m)
+        distance = self._off(speed_m_s, turn_rate_rad_s, settings.lever_m)
         best = int(distance.argmin())
-        return self.gaits[best] if distance[best] <= tolerance_m_s else None
+        return self.gaits[best] if distance[best] <= settings.near_m_s else None
 
     def _off(self, speed_m_s: float, turn_rate_rad_s: float, lever_m: float) -> np.ndarray:
         """Return how far every gait's steady motion, in the controller's mm/s and mrad/s, is from another."""
@@ -258,7 +256,7 @@ class GaitTable(Result):
         return f"{len(self.gaits)} gaits of robot '{self.robot_name}' up to {fastest:.3f} m/s"
 
     def figure(self) -> Figure:
-        """Return speed against the path's bend, coloured by the width of the swept band."""
+        """Return speed against the path's curvature, coloured by the width of the swept band."""
         from srs_opt.gait_opt.figures import pareto_figure
 
         return pareto_figure(self)

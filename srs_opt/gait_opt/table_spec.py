@@ -4,20 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from srs_opt.gait_opt.table_settings import TABLE_CONTENT, TableContentSettings
 from srs_opt.robot import Robot
-
-RADII_OVER_LENGTH = (4.0, 1.6, 0.9, 0.6, 0.45)
-# total width of the swept band over the body's: of straight gaits, and of turns by radius (as above)
-STRAIGHT_BANDS = (1.95, 1.8, 1.65, 1.5, 1.4, 1.36, 1.3)
-TURN_BANDS = ((1.75, 1.5, 1.35), (1.75, 1.5, 1.35), (1.75, 1.5), (1.75, 1.5, 1.4), (1.6,))
-# Gathering speed at a is like rolling on wheels whose friction is larger by a/g: what is the fastest then
-# accelerates best. For the built-in robot the loads stand for 0.15 and 0.34 m/s2: what gathers the last
-# speed, and what sets off from rest.
-STRONG_LOAD, RUSH_LOAD = 0.35, 0.8
-# enough to see how a new robot goes and to plan through a wide maze: two radii, one slimmer band
-QUICK_RADII_OVER_LENGTH, QUICK_STRAIGHT_BANDS = (1.6, 0.6), (1.65,)
-STRONG_BANDS, STRONG_TURN_BANDS = (1.95, 1.75, 1.6), ((), (1.75,), (1.75,), (1.75,), ())
-RUSH_TURN_BANDS: tuple[tuple[float, ...], ...] = ((), (), (), ())
 
 
 @dataclass(frozen=True)
@@ -49,7 +37,9 @@ class TableSpec:
         return replace(robot, friction_tangential=(1 + self.load) * robot.friction_tangential)
 
 
-def table_specs(robot: Robot, *, quick: bool = False) -> tuple[TableSpec, ...]:
+def table_specs(
+    robot: Robot, *, quick: bool = False, content: TableContentSettings = TABLE_CONTENT
+) -> tuple[TableSpec, ...]:
     """Return what a table, or a quick one, holds, forward and to the left; the other quadrants are images.
 
     Fast gaits go from the straight one to the tightest turn; at every radius, bands go from the fast gait's
@@ -58,11 +48,13 @@ def table_specs(robot: Robot, *, quick: bool = False) -> tuple[TableSpec, ...]:
     """
     first = TableSpec("fast", None, None, None)
     if quick:
-        return _fan(robot, first, QUICK_STRAIGHT_BANDS, ((), ()), QUICK_RADII_OVER_LENGTH)
-    fast = _fan(robot, first, STRAIGHT_BANDS, TURN_BANDS)
-    strong = TableSpec("strong", None, None, "fast", STRONG_LOAD)
-    rush = TableSpec("rush", None, None, "strong", RUSH_LOAD)
-    laden = _fan(robot, strong, STRONG_BANDS, STRONG_TURN_BANDS) + _fan(robot, rush, (), RUSH_TURN_BANDS)
+        return _fan(robot, first, content.quick_straight_bands, ((), ()), content.quick_radii)
+    fast = _fan(robot, first, content.straight_bands, content.turn_bands, content.radii)
+    strong = TableSpec("strong", None, None, "fast", content.strong_load)
+    rush = TableSpec("rush", None, None, "strong", content.rush_load)
+    laden = _fan(robot, strong, content.strong_bands, content.strong_turn_bands, content.radii) + _fan(
+        robot, rush, (), content.rush_turn_bands, content.radii
+    )
     return fast + laden
 
 
@@ -71,7 +63,7 @@ def _fan(
     first: TableSpec,
     straight: tuple[float, ...],
     turns: tuple[tuple[float, ...], ...],
-    radii_over_length: tuple[float, ...] = RADII_OVER_LENGTH,
+    radii_over_length: tuple[float, ...],
 ) -> tuple[TableSpec, ...]:
     """Return the first spec, its narrower companions, and the same at every radius."""
     spine = robot.segments * robot.pitch_m

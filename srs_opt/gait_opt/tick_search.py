@@ -15,13 +15,7 @@ from srs_opt.gait_opt.continuation import orbits_of
 from srs_opt.gait_opt.corrections import symmetrized
 from srs_opt.gait_opt.goal import tick_counts
 from srs_opt.gait_opt.score import score
-
-# Periods about the optimum's, in ticks: half miss the even period beside an odd one, double find no more
-_PERIODS = 4
-_SEARCHED = 2  # starts from which the search goes on
-_MOST_TRIALS = 220  # simulations per start; a search on four segments ends after about half of them
-_PRESSURE_STEPS = (0.02, 0.004)  # shares by which the pressure moves
-_GAINED = 1e-5
+from srs_opt.gait_opt.search_settings import TICK_SEARCH
 
 _Rows = tuple[tuple[tuple[int, int], ...], ...]
 
@@ -83,7 +77,10 @@ def searched_on_ticks(problem: CycleProblem, gait: Gait, rounded: Gait) -> Gait:
     """
     search = _Search(problem, max(math.ceil(problem.limits.min_dwell_s / problem.limits.tick_s - 1e-6), 1))
     starts = {search.value(start): start for start in _starts(problem, gait, rounded)}
-    found = [search.improved(starts[value], value) for value in sorted(starts, reverse=True)[:_SEARCHED]]
+    found = [
+        search.improved(starts[value], value)
+        for value in sorted(starts, reverse=True)[: TICK_SEARCH.searched_starts]
+    ]
     value, best = max(found, key=lambda each: each[0], default=(-math.inf, None))
     if best is None or value <= score(problem, rounded, orbits_of(problem, rounded)).total:
         return rounded
@@ -109,17 +106,17 @@ class _Search:
         """Return the score and gait from which no move gains; a move that gains is repeated."""
         pressure, trials, improved = self.problem.limits.pressure_kpa, 0, True
         tried = {best}
-        while improved and trials < _MOST_TRIALS:
+        while improved and trials < TICK_SEARCH.most_trials:
             improved = False
             for k in range(len(list(_moves(best, pressure)))):
-                while trials < _MOST_TRIALS:
+                while trials < TICK_SEARCH.most_trials:
                     trial = list(_moves(best, pressure))[k]
                     if trial in tried:
                         break
                     tried.add(trial)
                     trials += 1
                     new = self.value(trial)
-                    if not new > value + _GAINED:
+                    if not new > value + TICK_SEARCH.gain:
                         break
                     best, value, improved = trial, new, True
         return value, best
@@ -128,7 +125,9 @@ class _Search:
 def _starts(problem: CycleProblem, gait: Gait, rounded: Gait) -> Iterator[TickGait]:
     tick_s = problem.limits.tick_s
     least, most = tick_counts(problem.limits.frequency_hz, tick_s)
-    periods = sorted(range(least, most + 1), key=lambda n: abs(n * tick_s - gait.period_s))[:_PERIODS]
+    periods = sorted(range(least, most + 1), key=lambda n: abs(n * tick_s - gait.period_s))[
+        : TICK_SEARCH.periods
+    ]
     single = all(len(pairs) == 1 for pairs in gait.intervals)
     for period in periods:
         yield TickGait.of_gait(gait, period)
@@ -147,7 +146,7 @@ def _moves(gait: TickGait, pressure_kpa: tuple[float, float]) -> Iterator[TickGa
             for k, (on, length) in enumerate(pairs):
                 yield _with(gait, i, k, on, length + step)
                 yield _with(gait, i, k, on + step, length - step)
-        for share in _PRESSURE_STEPS:
+        for share in TICK_SEARCH.pressure_steps:
             pressure = float(np.clip(gait.pressure_kpa * (1 + step * share), *pressure_kpa))
             yield replace(gait, pressure_kpa=round(pressure, 3))
 

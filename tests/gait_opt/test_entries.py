@@ -64,12 +64,12 @@ def test_a_driver_gets_gaits_for_another_robot(table):
     robot = ROBOT.with_values(links=4, tau1_s=0.12)
     limits = Limits(pressure_kpa=(20.0, 55.0))
     asked = Motion(0.05, 0.0), Motion(0.1, 0.5), Motion(0.0, 0.3)
-    bred = driver_gaits(
+    found = driver_gaits(
         robot, "complex", limits, lambda n, g: images(robot, "complex", n, g, 1e-3), wanted=asked
     )
-    assert {e.name.split()[0] for e in bred} == {"slow", "pivot"}
-    assert len(bred) == 2 + 4 + 2
-    for entry, motion in zip(bred[::2], (asked[0], asked[1], asked[1], asked[2])):
+    assert {e.name.split()[0] for e in found} == {"slow", "pivot"}
+    assert len(found) == 2 + 4 + 2
+    for entry, motion in zip(found[::2], (asked[0], asked[1], asked[1], asked[2])):
         sign = -1 if " back" in entry.name else 1
         assert sign * entry.speed_m_s == pytest.approx(motion.speed_m_s, abs=0.025)
         assert abs(entry.turn_rate_rad_s) == pytest.approx(motion.turn_rate_rad_s, abs=0.25)

@@ -1,5 +1,7 @@
 """Gait tables for several robots: chosen by what each makes of a gait."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -34,7 +36,7 @@ def test_actuators_that_are_off_stand_beside_the_softest_and_the_stiffest_body()
 @pytest.fixture
 def few(monkeypatch, tmp_path):
     """Two gaits in place of the shipped table, one of them for drivers; what is kept, is kept in a folder."""
-    monkeypatch.setattr(companions, "OFFSETS", (0.0,))
+    monkeypatch.setattr(companions, "COMPANION", replace(companions.COMPANION, offsets=(0.0,)))
     shipped = shipped_table()
     gaits = (shipped["fast"], next(g for g in shipped.gaits if not g.planned))
     table = GaitTable(shipped.robot_name, shipped.fingerprint, shipped.model, gaits)

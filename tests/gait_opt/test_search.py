@@ -183,7 +183,7 @@ def test_starts_give_the_same_bits_wherever_they_run_and_go_on(monkeypatch, tmp_
         """Leave out what follows the starts: one computation, in this process always."""
         return SimpleNamespace(steps=(), prices=()), None, orbits_of(problem, gait)
 
-    monkeypatch.setattr(search_module, "polished", as_it_is)
+    monkeypatch.setattr(search_module, "finished", as_it_is)
     problem = CycleProblem((ROBOT,), "complex", Goal(), Limits())
     told = []
 

@@ -8,7 +8,7 @@ from test_collocation import derivative_errors, held_gait
 
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Wave, published_wave
-from srs_opt.gait_opt import from_rest, polish
+from srs_opt.gait_opt import finish, from_rest
 from srs_opt.gait_opt.collocation.guess import unknowns_from_orbits
 from srs_opt.gait_opt.collocation.layout import Mesh
 from srs_opt.gait_opt.collocation.problem import CycleProblem
@@ -16,6 +16,7 @@ from srs_opt.gait_opt.continuation import Stage, Step, orbits_of, run_stages
 from srs_opt.gait_opt.goal import Goal, Limits
 from srs_opt.gait_opt.robust import of_stiffness, relative, stiffness_interval
 from srs_opt.gait_opt.score import score
+from srs_opt.gait_opt.search_settings import FROM_REST
 from srs_opt.gait_opt.softness import robust_gait
 from srs_opt.orbit.steady import steady_gait
 from srs_opt.robot import wpi_srs
@@ -101,11 +102,11 @@ def test_a_stiffness_known_with_a_deviation_stands_for_its_interval():
 
 
 def test_search_from_rest_gains_on_ticks_inside_the_limits(monkeypatch):
-    monkeypatch.setattr(from_rest, "GENERATIONS", 4)
+    monkeypatch.setattr(from_rest, "FROM_REST", replace(FROM_REST, generations=4))
     start = Wave(1.99, 46.0, (0.0, 1.2, 2.15, 2.75), (0.0,) * 4).gait()
     case = problem(SOFT.with_values(bending_stiffness_n_m2=0.002))
     found = from_rest.search_from_rest(case, start, seed=3)
-    assert found.evaluations == 1 + 4 * from_rest.MEMBERS
+    assert found.evaluations == 1 + 4 * FROM_REST.members
     assert found.after > found.before + 0.05
     assert score(case, found.gait, orbits_of(case, found.gait)).total == pytest.approx(found.after)
     assert 1.0 <= found.gait.frequency_hz <= 2.0 + 1e-9
@@ -128,9 +129,9 @@ def test_what_was_given_is_kept_where_no_better_gait_has_a_steady_motion(monkeyp
     def lost(*arguments):
         raise NoAnswerError("the motion does not repeat with the gait's period")
 
-    monkeypatch.setattr(polish, "optimize_switch_times", lost)
+    monkeypatch.setattr(finish, "optimize_switch_times", lost)
     rigid = CycleProblem((wpi_srs(),), "complex", Goal("speed"), Limits())
     gait = published_wave(wpi_srs(), 2.0, 55.0).gait()
-    exact, certificate, orbits = polish.polished(rigid, gait, 0.02)
-    assert exact.gait == orbits[0].gait == polish.rounded(rigid, gait)
+    exact, certificate, orbits = finish.finished(rigid, gait, 0.02)
+    assert exact.gait == orbits[0].gait == finish.rounded(rigid, gait)
     assert certificate.passed

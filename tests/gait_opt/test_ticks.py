@@ -8,8 +8,8 @@ from srs_opt.errors import InputError
 from srs_opt.gait_opt.catalogue import shipped_table
 from srs_opt.gait_opt.certificate import certify
 from srs_opt.gait_opt.collocation.problem import CycleProblem
+from srs_opt.gait_opt.finish import quantized
 from srs_opt.gait_opt.goal import Goal, Limits, tick_counts
-from srs_opt.gait_opt.polish import quantized
 from srs_opt.gait_opt.switch_times import collocated_speeds
 from srs_opt.gait_opt.ticks import Schedule
 from srs_opt.robot import wpi_srs

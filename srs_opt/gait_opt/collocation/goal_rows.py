@@ -16,14 +16,13 @@ from srs_opt.gait_opt.collocation.layout import (
     Layout,
 )
 from srs_opt.gait_opt.collocation.point import PointKind, linear_shape
-from srs_opt.gait_opt.goal import TURN_ERROR, air_work_j
+from srs_opt.gait_opt.goal import air_work_j
 from srs_opt.gait_opt.objectives.cycle import SAMPLES
 from srs_opt.gait_opt.objectives.objective import Formulas, Objective, formulas
+from srs_opt.gait_opt.settings import COLLOCATION, GOAL
 from srs_opt.model.registry import build
 
 GOAL_NUMBERS = ("min_dwell_s", "radius_m", "envelope_m", "chamber_volume_m3")
-_WITHIN = 0.75  # share of the tolerated miss of a radius that robots other than the first may use
-_HAT = 0.01  # half width, in cycles, over which switches are spread where formulas see the curvature
 
 
 @dataclass(frozen=True)
@@ -98,8 +97,8 @@ def goal_rows(layout: Layout, kind: GoalKind, times: Times | None = None) -> Goa
             if r == 0:
                 found.append(("radius", speed - arc, 0.0, 0.0))
             else:  # one gait cannot give every robot the very same radius
-                not_negative("radius", speed - (1 - _WITHIN * TURN_ERROR) * arc)
-                not_negative("radius", (1 + _WITHIN * TURN_ERROR) * arc - speed)
+                not_negative("radius", speed - (1 - COLLOCATION.other_robots_share * GOAL.turn_error) * arc)
+                not_negative("radius", (1 + COLLOCATION.other_robots_share * GOAL.turn_error) * arc - speed)
         merit, rows = _formulas_of(aim, layout.kinds[r], shared, u, number, weights[r], parameters[r])
         not_negative("merit", merit / units[r] - shared[layout.merit])
         found += [
@@ -159,5 +158,7 @@ def _curvature(kind: PointKind, switches: ca.SX, frequency: ca.SX, pressure: ca.
         )
     plain = replace(kind, ordered=False, envelope=False, curvature=False)
     at = ca.DM(np.arange(SAMPLES)[None] / SAMPLES)
-    kappa, _ = linear_shape(plain, SAMPLES)(switches, frequency, pressure, at, p, _HAT)
+    kappa, _ = linear_shape(plain, SAMPLES)(
+        switches, frequency, pressure, at, p, COLLOCATION.curvature_switch_half_width
+    )
     return kappa

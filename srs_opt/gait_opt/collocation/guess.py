@@ -11,13 +11,12 @@ from srs_opt.gait import Gait
 from srs_opt.gait_opt.collocation.layout import ENVELOPE_UNIT_M, PRESSURE_UNIT_KPA, Layout
 from srs_opt.gait_opt.collocation.layout import Mesh as CycleMesh
 from srs_opt.gait_opt.collocation.point import BODY, PointKind, linear_shape
+from srs_opt.gait_opt.settings import COLLOCATION
 from srs_opt.geometry import centre_of_rotation, rotate
 from srs_opt.model.registry import build, state_layout
 from srs_opt.orbit.steady import Orbit
 from srs_opt.robot import Robot
 from srs_opt.simulate.rosenbrock import VELOCITY
-
-_STRAIGHT = 1e-6  # turn per cycle below which a gait counts as straight, rad
 
 
 def switches_of(gait: Gait, first_s: float) -> np.ndarray:
@@ -71,7 +70,7 @@ def states_over_cycle(
     x, y = rotate(
         tilt - turn * spread / period, *(np.interp(spread, time_s, orbit.pose[:, i]) for i in range(2))
     )
-    if abs(turn) < _STRAIGHT:
+    if abs(turn) < COLLOCATION.straight_turn_rad:
         ahead, aside = x - speed * spread, y
     else:  # in the frame that turns about the centre of rotation, the centre of mass stays near one place
         centre = _centre(orbit.motion.displacement)

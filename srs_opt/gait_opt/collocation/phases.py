@@ -7,14 +7,14 @@ from scipy import sparse
 
 from srs_opt.gait_opt.collocation.goal_rows import Times
 from srs_opt.gait_opt.collocation.layout import NODES, Mesh
+from srs_opt.gait_opt.settings import COLLOCATION
 
 Cuts = tuple[np.ndarray, ...]
-COINCIDENT = 1e-7  # cycles; switches closer than this are one instant, their order is free
 
 
 def switch_order(switches: np.ndarray) -> np.ndarray:
     """Return the switches' indices in the order in which they happen in a cycle, the first at time 0."""
-    fraction = np.mod(switches - switches[0] + COINCIDENT, 1.0)
+    fraction = np.mod(switches - switches[0] + COLLOCATION.coincident_cycles, 1.0)
     return np.argsort(fraction, kind="stable")
 
 
@@ -27,7 +27,7 @@ def phase_cuts(switches: np.ndarray, order: np.ndarray, places: np.ndarray, unti
         Fractions of the cycle after the first switch, and how many elements should end before each of them;
         both ascend. Every phase gets one element at least.
     """
-    fraction = np.mod(switches - switches[0] + COINCIDENT, 1.0)[order]
+    fraction = np.mod(switches - switches[0] + COLLOCATION.coincident_cycles, 1.0)[order]
     starts = np.append(fraction, 1.0 + fraction[0]) - fraction[0]
     levels = np.interp(starts, places, until)
     cuts = []
@@ -53,7 +53,7 @@ def phase_times(switches: np.ndarray, order: np.ndarray, cuts: Cuts) -> tuple[Me
     cuts : from `phase_cuts`
     """
     n = switches.size
-    whole = np.floor(switches - switches[0] + COINCIDENT)
+    whole = np.floor(switches - switches[0] + COLLOCATION.coincident_cycles)
     start = switches - whole
     starts = np.append(start[order], 1.0 + start[order[0]])
     phase_lengths = np.diff(starts)
@@ -88,12 +88,15 @@ def phase_times(switches: np.ndarray, order: np.ndarray, cuts: Cuts) -> tuple[Me
 
 def exchanged(switches: np.ndarray, order: np.ndarray) -> np.ndarray | None:
     """Return the order with every phase of zero length turned round (None if there is none)."""
-    fraction = np.mod(switches - switches[0] + COINCIDENT, 1.0)
+    fraction = np.mod(switches - switches[0] + COLLOCATION.coincident_cycles, 1.0)
     new = order.copy()
     changed = False
     k = 1
     while k < order.size - 1:
-        if abs(fraction[order[k + 1]] - fraction[order[k]]) < 1e3 * COINCIDENT:
+        if (
+            abs(fraction[order[k + 1]] - fraction[order[k]])
+            < COLLOCATION.met_over_coincident * COLLOCATION.coincident_cycles
+        ):
             new[k], new[k + 1] = order[k + 1], order[k]
             changed = True
             k += 2

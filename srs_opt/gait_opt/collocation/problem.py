@@ -13,16 +13,12 @@ from srs_opt.gait_opt.collocation.layout import ENVELOPE_UNIT_M, PRESSURE_UNIT_K
 from srs_opt.gait_opt.collocation.point import QUADRATURES, PointKind
 from srs_opt.gait_opt.collocation.program import IPOPT, Program, program
 from srs_opt.gait_opt.collocation.solver import Solver
-from srs_opt.gait_opt.goal import LEAST_TURN_RAD_S, STRAIGHT_RAD_S, TURN_ERROR, Goal, Limits
+from srs_opt.gait_opt.goal import Goal, Limits
 from srs_opt.gait_opt.objectives.objective import Formulas, formulas
+from srs_opt.gait_opt.settings import COLLOCATION, GOAL
 from srs_opt.model.parameters import Structure
 from srs_opt.model.registry import build
 from srs_opt.robot import Robot
-
-_FREE = 1e3
-_FASTEST_TURN_RAD_S = 30.0
-_HAT = 0.5  # half width of a smoothed switch over the mean element
-_WITHIN = 0.75  # share of the tolerated turn that robots other than the first may use
 
 
 @dataclass(frozen=True)
@@ -116,7 +112,7 @@ class CycleProblem:
             turns = np.zeros(p.layout.kinds[0].switches * p.layout.points)
         else:
             place, turns = p.times.constant, p.times.turns.ravel()
-        half_width = _HAT * np.diff(mesh.edges).mean()
+        half_width = COLLOCATION.switch_half_width * np.diff(mesh.edges).mean()
         parts = [place, np.array(numbers), np.array([half_width])]
         for robot, kind, scale in zip(self.robots, p.layout.kinds, scales):
             smoothed = replace(robot, friction_speed_m_s=max(friction_speed_m_s, robot.friction_speed_m_s))
@@ -138,7 +134,7 @@ class CycleProblem:
             low[2] = high[2] = 0.0  # the first switch sets the clock
         for r in range(len(self.robots)):
             speed, turn = layout.unknown(r, "speed"), layout.unknown(r, "turn_rate")
-            low[speed], high[speed] = goal.floor_m_s or -_FREE, _FREE
+            low[speed], high[speed] = goal.floor_m_s or -COLLOCATION.fastest_m_s, COLLOCATION.fastest_m_s
             low[turn], high[turn] = self._turn_bounds(nominal=r == 0)
             for side in ("left", "right"):
                 low[layout.unknown(r, side)] = 0.0
@@ -148,12 +144,18 @@ class CycleProblem:
     def _turn_bounds(self, nominal: bool) -> tuple[float, float]:
         goal = self.goal
         if goal.turn in ("radius", "any"):
-            return -_FASTEST_TURN_RAD_S, _FASTEST_TURN_RAD_S
+            return -COLLOCATION.fastest_turn_rad_s, COLLOCATION.fastest_turn_rad_s
         if goal.turn == "side":
-            low, high = sorted((goal.sense * LEAST_TURN_RAD_S, goal.sense * _FASTEST_TURN_RAD_S))
+            low, high = sorted(
+                (goal.sense * GOAL.least_turn_rad_s, goal.sense * COLLOCATION.fastest_turn_rad_s)
+            )
             return low, high
         wanted = goal.turn_rate_rad_s or 0.0
-        spare = 0.0 if nominal else _WITHIN * max(STRAIGHT_RAD_S, TURN_ERROR * abs(wanted))
+        spare = (
+            0.0
+            if nominal
+            else COLLOCATION.other_robots_share * max(GOAL.straight_rad_s, GOAL.turn_error * abs(wanted))
+        )
         return wanted - spare, wanted + spare
 
     def _row_bounds(self, p: Program) -> tuple[np.ndarray, np.ndarray]:

@@ -10,29 +10,29 @@ from srs_opt.gait_opt.collocation.layout import DEGREE, NODES, PRESSURE_UNIT_KPA
 from srs_opt.gait_opt.collocation.phases import Cuts
 from srs_opt.gait_opt.collocation.point import BODY, point_functions
 from srs_opt.gait_opt.collocation.program import Program, Solution
+from srs_opt.gait_opt.settings import COLLOCATION
 
 BETWEEN = np.array([0.08, 0.4, 0.85])  # places inside an element, away from its nodes
 _ORDER = 4.0
-_MOST_GROWTH = 3.0
 
 
 def _basis() -> tuple[np.ndarray, np.ndarray]:
-    """Return values and slopes of the Lagrange basis (nodes 0, c1, c2, c3) at BETWEEN, (4, 3) each."""
+    """Return values and derivatives of the Lagrange basis (nodes 0, c1, c2, c3) at BETWEEN, (4, 3) each."""
     nodes = np.concatenate([[0.0], NODES])
-    values, slopes = [], []
+    values, derivatives = [], []
     for j in range(DEGREE + 1):
         others = np.delete(nodes, j)
         polynomial = np.poly1d(others, r=True) / np.prod(nodes[j] - others)
         values.append(polynomial(BETWEEN))
-        slopes.append(polynomial.deriv()(BETWEEN))
-    return np.array(values), np.array(slopes)
+        derivatives.append(polynomial.deriv()(BETWEEN))
+    return np.array(values), np.array(derivatives)
 
 
 def defects(p: Program, solution: Solution, parameters: np.ndarray, mesh: Mesh, robot: int = 0) -> np.ndarray:
     """Return the largest scaled defect of the body's velocity inside every element, (elements,).
 
-    The defect is the difference between slope and equations, times the element's width: about the local
-    error in units of the states' typical sizes.
+    The defect is the difference between the polynomial's derivative and the equations, times the element's
+    width: about the local error in units of the states' typical sizes.
     """
     layout, kind = p.layout, p.layout.kinds[robot]
     n, s = mesh.elements, kind.states
@@ -41,9 +41,9 @@ def defects(p: Program, solution: Solution, parameters: np.ndarray, mesh: Mesh, 
     numbers, scale = (parameters[sizes[3 + 3 * robot + k] : sizes[4 + 3 * robot + k]] for k in range(2))
     x = solution.z[layout.states(robot)].reshape(n, DEGREE, s)
     nodes = np.concatenate([np.roll(x[:, -1:], 1, axis=0), x], axis=1)
-    values, slopes = _basis()
+    values, derivatives = _basis()
     between = np.einsum("ejs,jb->ebs", nodes, values)
-    slope = np.einsum("ejs,jb->ebs", nodes, slopes)
+    derivative = np.einsum("ejs,jb->ebs", nodes, derivatives)
     width = np.diff(mesh.edges)
     at = mesh.edges[:-1, None] + width[:, None] * BETWEEN
     z = solution.z
@@ -63,13 +63,15 @@ def defects(p: Program, solution: Solution, parameters: np.ndarray, mesh: Mesh, 
     turns = parameters[sizes[5 + 3 * robot] : sizes[6 + 3 * robot]].reshape(n, DEGREE, kind.switches)
     turns = turns[:, : BETWEEN.size].reshape(points, kind.switches).T
     rates = np.asarray(function(y.T, scale, numbers, half_width, turns))[:s].T.reshape(n, BETWEEN.size, s)
-    error: np.ndarray = np.abs(slope - rates)[:, :, : min(3, BODY)].max(axis=(1, 2))
+    error: np.ndarray = np.abs(derivative - rates)[:, :, : min(3, BODY)].max(axis=(1, 2))
     return error
 
 
 def refined_cuts(defect: np.ndarray, cuts: Cuts, tolerance: float) -> Cuts:
     """Return cuts with every element whose defect is above `tolerance` split into as many as should do."""
-    growth = np.clip((np.maximum(defect, 1e-12) / tolerance) ** (1 / _ORDER), 1.0, _MOST_GROWTH)
+    growth = np.clip(
+        (np.maximum(defect, 1e-12) / tolerance) ** (1 / _ORDER), 1.0, COLLOCATION.largest_refinement
+    )
     parts = iter(np.ceil(growth).astype(int))
     finer = []
     for ends in cuts:

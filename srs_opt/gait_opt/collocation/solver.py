@@ -9,12 +9,10 @@ from typing import Any
 import casadi as ca
 
 from srs_opt.errors import InputError
+from srs_opt.gait_opt.settings import COLLOCATION
 
 SOLVERS = ("ipopt", "fatrop", "sqpmethod")
 _MINIMUM_DEGREE = 0  # MUMPS's ordering: quicker here than its own choice; METIS draws at random, bits differ
-# starts are simulated motions, nearly feasible: steps that leave their neighbourhood follow the linearized
-# friction to where nothing holds any more, and dozens of iterations find no way back
-_FEASIBLE = 3.0
 _COMMON: dict[str, Any] = {
     "print_time": False, "calc_lam_p": False, "error_on_fail": False, "show_eval_warnings": False,
 }  # fmt: skip
@@ -22,7 +20,7 @@ _IPOPT = {
     "print_level": 0, "sb": "yes", "mu_strategy": "adaptive", "max_iter": 300, "tol": 1e-6,
     "linear_solver": "mumps", "mumps_pivot_order": _MINIMUM_DEGREE,
     "acceptable_tol": 1e-5, "acceptable_iter": 8, "warm_start_init_point": "no",
-    "nlp_scaling_method": "none", "theta_max_fact": _FEASIBLE,
+    "nlp_scaling_method": "none",
 }  # fmt: skip
 _SQP: dict[str, Any] = {
     "qpsol": "osqp", "max_iter": 300, "tol_du": 1e-4, "tol_pr": 1e-6, "convexify_strategy": "regularize",
@@ -99,7 +97,11 @@ def nlp_solver(
     """
     own, options = dict(solver.options), dict(_COMMON)
     if solver.name == "ipopt":
-        options |= {**derivatives, "no_nlp_grad": True, "ipopt": {**_IPOPT, **stage, **own}}
+        options |= {
+            **derivatives,
+            "no_nlp_grad": True,
+            "ipopt": {**_IPOPT, "theta_max_fact": COLLOCATION.feasible_factor, **stage, **own},
+        }
     elif solver.name == "fatrop":
         known = {key: stage[key] for key in ("max_iter", "tol") if key in stage}
         options |= {

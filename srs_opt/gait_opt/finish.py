@@ -14,19 +14,16 @@ from srs_opt.gait_opt.continuation import Report, orbits_of
 from srs_opt.gait_opt.corrections import on_ticks, steered, symmetrized
 from srs_opt.gait_opt.prices import of_ticks
 from srs_opt.gait_opt.score import Score, score
+from srs_opt.gait_opt.search_settings import ROUNDING
 from srs_opt.gait_opt.starts import turn_miss
-from srs_opt.gait_opt.switch_times import Polished, collocated_speeds, optimize_switch_times
+from srs_opt.gait_opt.switch_times import ExactSwitchTimes, collocated_speeds, optimize_switch_times
 from srs_opt.gait_opt.tick_search import searched_on_ticks
 from srs_opt.orbit.steady import Orbit
 
-_TURN_RAD_S = 5e-3
-_LOST = 1e-3  # merit that an exactly straight gait may cost
-_ROUNDS = 3
 
-
-def polished(
+def finished(
     problem: CycleProblem, gait: Gait, reach: float, report: Report | None = None
-) -> tuple[Polished, Certificate, tuple[Orbit, ...]]:
+) -> tuple[ExactSwitchTimes, Certificate, tuple[Orbit, ...]]:
     """Return what the switch times' optimization made of `gait`, and the finished gait's certificate, orbits.
 
     The mesh sees band and curvature at some instants only: where the finished gait exceeds a limit, less is
@@ -34,19 +31,23 @@ def polished(
     certificate, the given one is kept; so it is where a soft body has no steady motion with what was found.
     """
     try:
-        return _polished(problem, gait, reach, report)
+        return _finished(problem, gait, reach, report)
     except NoAnswerError:
         plain = rounded(problem, gait)
         speeds = tuple(orbit.speed_m_s for orbit in orbits_of(problem, plain))
         certificate, orbits = certify(problem, plain, speeds)
-        return (Polished(plain, orbits, score(problem, plain, orbits), speeds, ()), certificate, orbits)
+        return (
+            ExactSwitchTimes(plain, orbits, score(problem, plain, orbits), speeds, ()),
+            certificate,
+            orbits,
+        )
 
 
-def _polished(
+def _finished(
     problem: CycleProblem, gait: Gait, reach: float, report: Report | None
-) -> tuple[Polished, Certificate, tuple[Orbit, ...]]:
+) -> tuple[ExactSwitchTimes, Certificate, tuple[Orbit, ...]]:
     asked, given = problem, gait
-    for _ in range(_ROUNDS):
+    for _ in range(ROUNDING.rounds):
         exact = optimize_switch_times(asked, gait, reach, report)
         played = quantized(problem, exact.gait)
         certificate, orbits = certify(problem, played, _claimed(problem, exact, played))
@@ -56,21 +57,21 @@ def _polished(
         asked, gait = less, exact.gait
     plain = rounded(problem, given)
     before = _score(problem, plain)
-    worse = score(problem, orbits[0].gait, orbits).total < before.total - _LOST * before.scale
+    worse = score(problem, orbits[0].gait, orbits).total < before.total - ROUNDING.loss * before.scale
     if worse or (not certificate.passed and orbits[0].gait != plain):
         # a millisecond further a soft body may settle in another orbit: then what was given is kept
         known = orbits_of(problem, plain)
         speeds = tuple(o.speed_m_s for o in known)
         kept, known = certify(problem, plain, speeds)
         if worse or kept.passed:
-            return Polished(plain, known, before, speeds, exact.steps), kept, known
+            return ExactSwitchTimes(plain, known, before, speeds, exact.steps), kept, known
     lost = exact.score.total - score(problem, orbits[0].gait, orbits).total
-    if lost > _LOST * exact.score.scale:
+    if lost > ROUNDING.loss * exact.score.scale:
         exact = replace(exact, prices=(of_ticks(problem, lost), *exact.prices))
     return exact, certificate, orbits
 
 
-def _claimed(problem: CycleProblem, exact: Polished, played: Gait) -> tuple[float, ...]:
+def _claimed(problem: CycleProblem, exact: ExactSwitchTimes, played: Gait) -> tuple[float, ...]:
     """Return the speeds by collocation that the certificate compares with simulation.
 
     Those of the last solve, unless the gait that is played differs so much from it, by ticks or because no
@@ -101,7 +102,7 @@ def quantized(problem: CycleProblem, gait: Gait) -> Gait:
     """Return the gait on ticks; where rounding costs something, the best one that a search on ticks finds."""
     near = rounded(problem, gait)
     exact = _score(problem, gait)
-    if _score(problem, near).total > exact.total - _LOST * exact.scale:
+    if _score(problem, near).total > exact.total - ROUNDING.loss * exact.scale:
         return near
     return searched_on_ticks(problem, gait, near)
 
@@ -115,11 +116,15 @@ def rounded(problem: CycleProblem, gait: Gait) -> Gait:
     if straight and all(len(pairs) == 1 for pairs in gait.intervals):
         even = on_ticks(symmetrized(exact), limits.tick_s, limits.frequency_hz)
         as_found = _score(problem, gait)
-        if _score(problem, even).total > as_found.total - _LOST * as_found.scale:
+        if _score(problem, even).total > as_found.total - ROUNDING.loss * as_found.scale:
             return even
     if goal.turn in ("side", "any"):
         return gait
-    return on_ticks(steered(gait, turn_miss(problem), _TURN_RAD_S, 0.1), limits.tick_s, limits.frequency_hz)
+    return on_ticks(
+        steered(gait, turn_miss(problem), ROUNDING.turn_tolerance_rad_s, ROUNDING.largest_bias),
+        limits.tick_s,
+        limits.frequency_hz,
+    )
 
 
 def _score(problem: CycleProblem, gait: Gait) -> Score:
