@@ -25,9 +25,10 @@ from planners.search.problem import Problem
 from srs_opt.gait import Gait
 from srs_opt.gait_opt.catalogue import default_table
 from srs_opt.manoeuvre.search import find
+from srs_opt.manoeuvre.settings import END
 from srs_opt.manoeuvre.shooting import shoot
 from srs_opt.manoeuvre.starts import vented
-from srs_opt.manoeuvre.task import REST_CURVATURE_1_M, REST_SPEED_M_S, End, Start, Task
+from srs_opt.manoeuvre.task import End, Start, Task
 from srs_opt.manoeuvre.valves import ValvePlan
 from srs_opt.orbit.body import integrator
 from srs_opt.orbit.steady import steady_gait
@@ -91,8 +92,8 @@ def rival_s(name: str) -> float | None:
     for k in range(0, len(cut), 64):
         for shot in shoot(run, run.rest(), cut[k : k + 64], 0.0025):
             states = shot.states
-            slow = np.hypot(states[:, 3], states[:, 4]) < REST_SPEED_M_S
-            straight = np.abs(states[:, run.layout.kappa]).max(axis=1) < REST_CURVATURE_1_M
+            slow = np.hypot(states[:, 3], states[:, 4]) < END.rest_speed_m_s
+            straight = np.abs(states[:, run.layout.kappa]).max(axis=1) < END.rest_curvature_1_m
             done = slow & straight & (states[:, 2] >= QUARTER) & (shot.time_s > shot.plan.duration_s - 0.6)
             if done.any():
                 best = min(best, float(shot.time_s[done.argmax()]))

@@ -22,11 +22,12 @@ from planners.motion.transitions import (
     motion_table,
     simulate_transitions,
 )
-from planners.motion.valves import DEFAULT_LIMITS, SETTLE_S, STAIR_S, ValveLimits
+from planners.motion.valves import DEFAULT_LIMITS, ValveLimits
 from srs_opt.files import atomic_path
 from srs_opt.gait_opt.robust import stiffness_deviation
 from srs_opt.gait_opt.settings import STIFFNESS
 from srs_opt.gait_opt.table import GaitTable
+from srs_opt.manoeuvre.settings import REGULATOR
 from srs_opt.robot import Robot
 from srs_opt.simulate.compiled import cache_folder
 
@@ -39,7 +40,7 @@ def table_key(robot: Robot, table: GaitTable, limits: ValveLimits = DEFAULT_LIMI
     gaits = [
         (e.gait.period_s, e.gait.pressure_kpa, e.gait.intervals, list(e.displacement)) for e in table.gaits
     ]
-    joints = [*astuple(limits), SETTLE_S, STAIR_S]
+    joints = [*astuple(limits), REGULATOR.settle_s, REGULATOR.stair_s]
     parts = json.dumps(
         [robot.fingerprint(), table.model, LEVELS, SAMPLES, STEP_S, joints, gaits], sort_keys=True
     )

@@ -21,14 +21,11 @@ import numpy as np
 from srs_opt.errors import InputError, NoAnswerError
 from srs_opt.gait import Gait, Interval
 from srs_opt.gait_opt.table import GaitTable, TableGait
+from srs_opt.manoeuvre.settings import REGULATOR
 from srs_opt.orbit.steady import steady_gait
 from srs_opt.robot import Robot
 from srs_opt.simulate.timeline import Timeline
 
-SETTLE_S = 0.1  # for a change of pressure where no rate is given
-# A ramp of pressure is integrated in stairs of this length at most. What they leave falls with its square: a
-# heading that is off by 0.01 mrad per change of gait. Half of it costs a search a sixth more steps.
-STAIR_S = 0.0125
 _SAME_S = 1e-9
 
 
@@ -43,7 +40,7 @@ class ValveLimits:
     tick_s : float
         The controller's tick: cycles take whole ticks, and switches come on them.
     pressure_rate_kpa_s : float, optional
-        Of the regulator. Without, every change of pressure takes SETTLE_S.
+        Of the regulator. Without, every change of pressure takes `REGULATOR.settle_s`.
     """
 
     min_dwell_s: float = 0.02
@@ -60,7 +57,7 @@ class ValveLimits:
         if from_kpa == to_kpa:
             return 0.0
         if self.pressure_rate_kpa_s is None:
-            return SETTLE_S
+            return REGULATOR.settle_s
         return abs(to_kpa - from_kpa) / self.pressure_rate_kpa_s
 
 
@@ -85,8 +82,8 @@ class Joint:
     from_kpa: float
     ramp_s: float
 
-    def timeline(self, stair_s: float = STAIR_S) -> Timeline:
-        """Return the cycle as the valves and the regulator play it, the ramp in stairs of that length."""
+    def timeline(self, stair_s: float | None = None) -> Timeline:
+        """Return the cycle as valves and regulator play it, the ramp in stairs of that length at most."""
         cycle = Timeline.of_gait(self.gait, self.gait.period_s)
         return _ramped(cycle, self.from_kpa, self.ramp_s, stair_s) if self.ramp_s else cycle
 
@@ -130,7 +127,7 @@ class Joints:
             self._known[before, now] = self._made(before, now)
         return self._known[before, now]
 
-    def timeline(self, before: int, now: int, stair_s: float = STAIR_S) -> Timeline:
+    def timeline(self, before: int, now: int, stair_s: float | None = None) -> Timeline:
         """Return the valves of a cycle of `now` after `before`; a joint must exist."""
         joint = self.joint(before, now)
         assert joint is not None  # searches offer no others
@@ -303,10 +300,10 @@ def intervals_of(first: int, switches: list[float]) -> tuple[Interval, ...]:
     return (*pairs, (on[-1], 0.0))
 
 
-def _ramped(cycle: Timeline, from_kpa: float, ramp_s: float, stair_s: float) -> Timeline:
+def _ramped(cycle: Timeline, from_kpa: float, ramp_s: float, stair_s: float | None) -> Timeline:
     """Return a cycle with the pressure's way from what it was: stairs through the middles of the ramp."""
     to_kpa = float(cycle.pressure_kpa[0])
-    stairs = math.ceil(ramp_s / stair_s - 1e-9)
+    stairs = math.ceil(ramp_s / (stair_s or REGULATOR.stair_s) - 1e-9)
     ends = np.cumsum(cycle.duration_s)
     edges = np.concatenate([ramp_s / stairs * np.arange(stairs + 1), ends])
     edges.sort()

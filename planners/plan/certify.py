@@ -19,11 +19,11 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from planners.motion.valves import STAIR_S
 from planners.search.problem import ROUNDING_M, Problem
 from planners.search.tree import Root, arrival_index, at_rest
 from srs_opt.errors import NoAnswerError
 from srs_opt.geometry import points_in_room
+from srs_opt.manoeuvre.settings import REGULATOR
 from srs_opt.model.outline import POINTS_PER_ARC
 from srs_opt.simulate.batched import Search, run_batched
 from srs_opt.simulate.integrate import Trajectory
@@ -35,7 +35,7 @@ Array = NDArray[np.float64]
 # With four times as much, most mazes of 16 x 16 cells ask for a third tolerance, in twice the time.
 TOLERANCE = 1.06e-5
 # Of the ramps of pressure; with the search's stairs they alone would err by 2 mm in 20 m.
-CERTIFIED_STAIR_S = STAIR_S / 4
+CERTIFIED_STAIR_S = REGULATOR.stair_s / 4
 FINER = 16.0  # twice as many steps
 LEVELS = 4  # tolerances at most; the last errs by a few micrometres in a hundred metres
 RATIO = 4.0  # of the errors of two levels at least; 15 to 113 was seen over 94 m. 2 would double the bound

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from planners.maze.places import Goal
 from planners.refine.shots import WindowShot
 from planners.search.problem import Problem
-from srs_opt.manoeuvre.rows import BEND_M2, LEVER_M, body_points
+from srs_opt.manoeuvre.rows import body_points
+from srs_opt.manoeuvre.settings import CONSTRAINT
 from srs_opt.model.state import FORWARD, HEADING, PLACE, X, Y
 
 Array = NDArray[np.float64]
@@ -78,40 +79,46 @@ class Limits:
         state, wanted = shot.states[-1], self.end.state
         jacobian = None if shot.sensitivity is None else shot.sensitivity[-1]
         length = self.problem.robot.length_m
+        lever_m = CONSTRAINT.lever * length
         if wanted is None:
             return self._arrived(state, jacobian)
-        bands = [(X, PLACE_OFF * length, 1.0), (Y, PLACE_OFF * length, 1.0), (HEADING, HEADING_RAD, LEVER_M)]
+        bands = [
+            (X, PLACE_OFF * length, 1.0),
+            (Y, PLACE_OFF * length, 1.0),
+            (HEADING, HEADING_RAD, lever_m),
+        ]
         found = []
         for index, tolerance, unit in bands:
             for sign in (1.0, -1.0):
                 value = unit * (tolerance - sign * (state[index] - wanted[index]))
                 found.append(_row(value, None if jacobian is None else -sign * unit * jacobian[index]))
         forward = 1.0 if wanted[FORWARD] >= 0 else -1.0
-        value = LEVER_M * (forward * (state[FORWARD] - wanted[FORWARD]) + SPEED_OFF * length)
-        found.append(_row(value, None if jacobian is None else LEVER_M * forward * jacobian[FORWARD]))
+        value = lever_m * (forward * (state[FORWARD] - wanted[FORWARD]) + SPEED_OFF * length)
+        found.append(_row(value, None if jacobian is None else lever_m * forward * jacobian[FORWARD]))
         return found + self._bends(shot, jacobian)
 
     def _bends(self, shot: WindowShot, jacobian: Array | None) -> list[Values]:
         where = self.problem.integrator.layout.kappa
         assert self.end.state is not None
+        bend_m2 = CONSTRAINT.bend * self.problem.robot.length_m * self.problem.robot.length_m
         wanted, largest = self.end.state[where], float(np.abs(shot.states[:, where]).max())
         found = []
         for k, index in enumerate(range(where.start, where.stop)):
             off = shot.states[-1, index] - wanted[k]
             for sign in (1.0, -1.0):
-                value = BEND_M2 * (BEND * largest - sign * off)
-                found.append(_row(value, None if jacobian is None else -sign * BEND_M2 * jacobian[index]))
+                value = bend_m2 * (BEND * largest - sign * off)
+                found.append(_row(value, None if jacobian is None else -sign * bend_m2 * jacobian[index]))
         return found
 
     def _arrived(self, state: Array, jacobian: Array | None) -> list[Values]:
-        goal = self.problem.goal
+        goal, lever_m = self.problem.goal, CONSTRAINT.lever * self.problem.robot.length_m
         inside, toward = depth(goal, state[PLACE])
         found = [_row(inside - self.spare_m / 4, None if jacobian is None else toward @ jacobian[PLACE])]
         if goal.heading is not None:
             off = (state[HEADING] - goal.heading + np.pi) % (2 * np.pi) - np.pi
             for sign in (1.0, -1.0):
-                value = LEVER_M * (0.99 * goal.heading_tolerance - sign * off)
-                found.append(_row(value, None if jacobian is None else -sign * LEVER_M * jacobian[HEADING]))
+                value = lever_m * (0.99 * goal.heading_tolerance - sign * off)
+                found.append(_row(value, None if jacobian is None else -sign * lever_m * jacobian[HEADING]))
         return found
 
     def _rooms(self, shots: list[WindowShot]) -> list[Values]:

@@ -9,8 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from planners.motion.valves import SETTLE_S, STAIR_S, Joint, ValveLimits, intervals_of
+from planners.motion.valves import Joint, ValveLimits, intervals_of
 from srs_opt.gait import Gait
+from srs_opt.manoeuvre.settings import REGULATOR
 from srs_opt.manoeuvre.valves import ValveRow
 from srs_opt.simulate.timeline import Timeline
 
@@ -86,7 +87,7 @@ class Window:
             tuple(map(tuple, owners)),
             tuple(map(float, begins[1:])),
             tuple(c.gait.pressure_kpa for c in cycles),
-            tuple(c.ramp_s if c.ramp_s or limits.pressure_rate_kpa_s else SETTLE_S for c in cycles),
+            tuple(c.ramp_s if c.ramp_s or limits.pressure_rate_kpa_s else REGULATOR.settle_s for c in cycles),
             cycles[0].from_kpa,
         )
 
@@ -151,7 +152,7 @@ class Window:
         begin = 0.0
         for k, ramp_s in enumerate(self.ramp_s):
             if ramp_s:
-                treads = max(1, round(ramp_s / STAIR_S))
+                treads = max(1, round(ramp_s / REGULATOR.stair_s))
                 found += [
                     Edge(column + k - 1 if k else -1, begin + ramp_s * j / treads, -1)
                     for j in range(treads + 1)
@@ -164,7 +165,7 @@ class Window:
         begins = np.array([0.0, *self.ends_s[:-1]])
         k = np.clip(np.searchsorted(begins, time_s, side="right") - 1, 0, self.cycles - 1)
         ramp = np.array(self.ramp_s)[k]
-        treads = np.maximum(np.round(ramp / STAIR_S), 1.0)
+        treads = np.maximum(np.round(ramp / REGULATOR.stair_s), 1.0)
         along = np.divide(time_s - begins[k], ramp, out=np.ones_like(time_s), where=ramp > 0)
         share = np.clip((np.floor(along * treads) + 0.5) / treads, 0.0, 1.0)
         share = np.where((ramp > 0) & (along < 1), share, 1.0)

@@ -8,15 +8,12 @@ from typing import Any
 import numpy as np
 
 from srs_opt.manoeuvre.rows import RowMaker
+from srs_opt.manoeuvre.settings import CONSTRAINT, MANOEUVRE_CERTIFICATE
 from srs_opt.manoeuvre.shooting import Shot
 from srs_opt.manoeuvre.task import Task
 from srs_opt.manoeuvre.valves import ValvePlan
 from srs_opt.model.state import POSE, VELOCITY
 from srs_opt.simulate.integrate import INTEGRATION, Integrator, Trajectory
-
-FINER = 16.0
-RATIO = 4.0  # of the errors of the two integrations at least, as in the planner's certificate
-ERROR_M = 5e-4  # of the end's place and heading (a lever of 0.1 m), that a certificate may have
 
 
 @dataclass(frozen=True)
@@ -75,29 +72,30 @@ class Certificate:
 
 def certify(run: Integrator, task: Task, plan: ValvePlan) -> tuple[Certificate, Trajectory]:
     """Simulate a manoeuvre afresh and check it against its task."""
-    coarse = run.integrate(plan.timeline(), task.start.state, INTEGRATION.tolerance_m_s / FINER)
-    fine = run.integrate(plan.timeline(), task.start.state, INTEGRATION.tolerance_m_s / FINER**2)
-    apart = (coarse.final[POSE] - fine.final[POSE]) * (1.0, 1.0, 0.1)
-    error = float(np.hypot(*apart[:2]) + abs(apart[2])) / RATIO
+    coarse_m_s = INTEGRATION.tolerance_m_s / MANOEUVRE_CERTIFICATE.finer
+    coarse = run.integrate(plan.timeline(), task.start.state, coarse_m_s)
+    fine = run.integrate(plan.timeline(), task.start.state, coarse_m_s / MANOEUVRE_CERTIFICATE.finer)
+    apart = (coarse.final[POSE] - fine.final[POSE]) * (1.0, 1.0, CONSTRAINT.lever * run.robot.length_m)
+    error = float(np.hypot(*apart[:2]) + abs(apart[2])) / MANOEUVRE_CERTIFICATE.ratio
     shot = Shot(plan, fine.time_s, seen_states(run, fine))
     rows = RowMaker(run, task, inside=1.0)
     end = float(rows.end_values(shot).min())
     space = float(rows.space_values(shot, np.arange(fine.time_s.size)).min(initial=np.inf))
-    bend = float(np.abs(fine.kappa).max())
+    curvature = float(np.abs(fine.kappa).max())
     bounds = task.bounds
     dwell = plan.shortest_dwell_s(task.start.ages_s(run.structure.segments))
     low, high = bounds.pressure_kpa
     if task.pressure_kpa is not None:  # a gait's own pressure is given
         low, high = min(low, task.pressure_kpa), max(high, task.pressure_kpa)
     certificate = Certificate(
-        end_ok=end >= error and error <= ERROR_M,
+        end_ok=end >= error and error <= MANOEUVRE_CERTIFICATE.error * run.robot.length_m,
         space_ok=space >= error,
-        curvature_ok=bounds.max_curvature_1_m is None or bend <= bounds.max_curvature_1_m * (1 + 1e-6),
+        curvature_ok=bounds.max_curvature_1_m is None or curvature <= bounds.max_curvature_1_m * (1 + 1e-6),
         dwell_ok=dwell >= bounds.dwell_s - 1e-9,
         tick_ok=plan.off_tick_s(bounds.tick_s) <= 1e-6 * bounds.tick_s + 1e-9,
         pressure_ok=low - 1e-9 <= plan.pressure_kpa <= high + 1e-9,
         shortest_dwell_s=round(dwell, 9) if np.isfinite(dwell) else None,
-        largest_curvature_1_m=bend,
+        largest_curvature_1_m=curvature,
         error_m=error,
     )
     return certificate, fine

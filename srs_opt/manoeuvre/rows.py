@@ -7,28 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from srs_opt.geometry import points_in_room, rotate
+from srs_opt.manoeuvre.settings import CONSTRAINT, END
 from srs_opt.manoeuvre.shooting import Shot
-from srs_opt.manoeuvre.task import (
-    GAIT_CURVATURE_SHARE,
-    GAIT_SPEED_M_S,
-    POSE_M,
-    POSE_RAD,
-    REST_CURVATURE_1_M,
-    REST_SPEED_M_S,
-    Task,
-)
+from srs_opt.manoeuvre.task import Task
 from srs_opt.model.state import HEADING, PLACE, POSE
 from srs_opt.simulate.integrate import Integrator
 from srs_opt.simulate.shapes import centre_lines
 
-LEVER_M = 0.1  # turns angles into lengths
-# Turn speeds into lengths, large enough that a violation costs more than it gains: a robot stops within a
-# fraction of a second, but the last 0.02 m/s of a fast gait take a second
-SECOND_M, GAIT_SECOND_M = 0.5, 5.0
-BEND_M2 = 0.03  # turns curvatures into lengths, likewise
-SPARE_M = 1e-4  # beyond a line, heading or wall, for the integration's error and ticks: 0.2 ms of way
-LOOK_S = 0.01  # between instants at which the body is measured; it moves 5 mm meanwhile
-_HAIR = 1e-6
 Part = tuple[np.ndarray, np.ndarray]  # values and derivatives
 
 
@@ -44,11 +29,14 @@ class Rows:
 
 
 class RowMaker:
-    """Makes the rows of one task; `inside` (0 to 1) tightens tolerances so that ticks do not break them."""
+    """Makes the rows of one task; `inside` (0 to 1) tightens the end's tolerances, for ticks to keep them."""
 
-    def __init__(self, run: Integrator, task: Task, inside: float = 0.8) -> None:
-        self.run, self.task, self.inside = run, task, inside
-        self.spare_m = SPARE_M if inside < 1 else 0.0
+    def __init__(self, run: Integrator, task: Task, inside: float | None = None) -> None:
+        self.run, self.task = run, task
+        self.inside = CONSTRAINT.inside if inside is None else inside
+        length = run.robot.length_m
+        self.spare_m = CONSTRAINT.spare * length if self.inside < 1 else 0.0
+        self.lever_m, self.bend_m2 = CONSTRAINT.lever * length, CONSTRAINT.bend * length * length
 
     def __call__(self, shot: Shot, radius_m: float = 0.0) -> Rows:
         """Return the rows of a simulated manoeuvre."""
@@ -93,24 +81,32 @@ class RowMaker:
             rows.append(self._linear(shot, -1, weights, -abs(end.past_m) - self.spare_m))
         if end.turn_rad is not None:
             weights = np.zeros(self.run.states)
-            weights[2] = np.sign(end.turn_rad) * LEVER_M
+            weights[2] = np.sign(end.turn_rad) * self.lever_m
             begun = float(weights @ self.task.start.state)
-            rows.append(self._linear(shot, -1, weights, -abs(end.turn_rad) * LEVER_M - begun - self.spare_m))
+            rows.append(
+                self._linear(shot, -1, weights, -abs(end.turn_rad) * self.lever_m - begun - self.spare_m)
+            )
         if end.pose is not None:
-            for index, tolerance, unit in ((0, POSE_M, 1.0), (1, POSE_M, 1.0), (2, POSE_RAD, LEVER_M)):
+            for index, tolerance, unit in (
+                (0, END.pose_m, 1.0),
+                (1, END.pose_m, 1.0),
+                (2, END.pose_rad, self.lever_m),
+            ):
                 rows += self._band(shot, index, end.pose[index], tolerance, unit)
         if end.rest:
             for index in (3, 4):
-                rows += self._band(shot, index, 0.0, REST_SPEED_M_S / 2, SECOND_M)
+                rows += self._band(shot, index, 0.0, END.rest_speed_m_s / 2, CONSTRAINT.rest_speed_s)
             for index in range(layout.kappa.start, layout.kappa.stop):
-                rows += self._band(shot, index, 0.0, REST_CURVATURE_1_M, BEND_M2)
+                rows += self._band(shot, index, 0.0, END.rest_curvature_1_m, self.bend_m2)
         if end.orbit is not None:
             wanted = end.orbit.solution.start
             for index in (3, 4):
-                rows += self._band(shot, index, wanted[index], GAIT_SPEED_M_S, GAIT_SECOND_M)
+                rows += self._band(shot, index, wanted[index], END.gait_speed_m_s, CONSTRAINT.gait_speed_s)
             largest = float(np.abs(end.orbit.kappa).max())
             for index in range(layout.kappa.start, layout.kappa.stop):
-                rows += self._band(shot, index, wanted[index], GAIT_CURVATURE_SHARE * largest, BEND_M2)
+                rows += self._band(
+                    shot, index, wanted[index], END.gait_curvature_share * largest, self.bend_m2
+                )
         return rows
 
     def _on_the_way(self, shot: Shot, looked: np.ndarray, radius_m: float) -> list[Part]:
@@ -136,10 +132,10 @@ class RowMaker:
         if most is not None:
             for index in range(self.run.layout.kappa.start, self.run.layout.kappa.stop):
                 for sign in (1.0, -1.0):
-                    values = BEND_M2 * (most - sign * shot.states[looked, index])
+                    values = self.bend_m2 * (most - sign * shot.states[looked, index])
                     by_unknowns = np.zeros((looked.size, 0))
                     if shot.sensitivity is not None:
-                        by_unknowns = -sign * BEND_M2 * shot.sensitivity[looked, index]
+                        by_unknowns = -sign * self.bend_m2 * shot.sensitivity[looked, index]
                         by_unknowns = np.column_stack([by_unknowns, np.zeros(looked.size)])
                     rows.append((values, by_unknowns))
         return rows
@@ -172,7 +168,7 @@ class RowMaker:
     @staticmethod
     def looks(shot: Shot) -> np.ndarray:
         """Return the nodes at which the body is measured."""
-        count = max(int(np.ceil(shot.time_s[-1] / LOOK_S)), 2)
+        count = max(int(np.ceil(shot.time_s[-1] / CONSTRAINT.interval_s)), 2)
         wanted = np.linspace(0.0, shot.time_s[-1], count + 1)
         return np.unique(np.searchsorted(shot.time_s, wanted - 1e-9).clip(max=shot.time_s.size - 1))
 
@@ -203,9 +199,11 @@ def body_points(
     turned = np.stack([-arm[..., 1], arm[..., 0]], axis=-1)
     jacobian = jacobian + turned[..., None] * moved[:, None, None, 2]
     for k in range(kappa.shape[1]):
-        hair = np.zeros(kappa.shape[1])
-        hair[k] = _HAIR
-        bent = (centre_lines(run, kappa + hair) - centre_lines(run, kappa - hair)) / (2 * _HAIR)
+        step = np.zeros(kappa.shape[1])
+        step[k] = CONSTRAINT.curvature_step_1_m
+        bent = (centre_lines(run, kappa + step) - centre_lines(run, kappa - step)) / (
+            2 * CONSTRAINT.curvature_step_1_m
+        )
         gx, gy = rotate(heading[:, None], bent[..., 0], bent[..., 1])
         by_kappa = moved[:, run.layout.kappa.start + k]
         jacobian += np.stack([gx, gy], axis=-1)[..., None] * by_kappa[:, None, None]

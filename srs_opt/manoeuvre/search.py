@@ -9,24 +9,17 @@ import numpy as np
 
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait
-from srs_opt.manoeuvre.breeding import bred
 from srs_opt.manoeuvre.certificate import Certificate, certify
-from srs_opt.manoeuvre.solve import SATISFIED_M, Candidate, Solver, smoothed
+from srs_opt.manoeuvre.settings import MANOEUVRE_SEARCH, MANOEUVRE_SOLVER
+from srs_opt.manoeuvre.solve import Candidate, Solver, smoothed
 from srs_opt.manoeuvre.starts import playable, starts
 from srs_opt.manoeuvre.task import Task
 from srs_opt.manoeuvre.ticks import on_ticks
 from srs_opt.manoeuvre.valves import ValvePlan, ValveRow
+from srs_opt.manoeuvre.wave_population import evolved
 from srs_opt.simulate.integrate import Integrator, Trajectory
 
 Tell = Callable[[str], None]
-# Of friction, for a start's first steps: sticking links do not feel small changes of their valves
-COARSE_FRICTION_M_S = 0.02
-COARSE_STEPS, FIRST_STEPS, LAST_STEPS = 8, 14, 60
-ROUGH_STEP_S = 0.0025  # of starts and softened friction
-FINE_STEP_S = 0.0005  # of ticks: errs by less than a tenth of a millimetre per metre
-POOL = 4  # optima that are perturbed; more spreads the effort, one gets stuck
-SHAKE_S, SHAKE_SHARE, SHAKE_KPA = (0.015, 0.035), 0.03, 2.0
-CLOSE = 0.015  # share of the best merit within which a perturbed optimum is refined
 
 
 @dataclass(frozen=True)
@@ -61,7 +54,7 @@ def find(
     gaits: Sequence[Gait],
     count: int = 8,
     populations: int = 2,
-    shakes: int = 24,
+    perturbations: int = 24,
     seed: int = 0,
     tell: Tell = lambda message: None,
 ) -> Manoeuvre:
@@ -72,7 +65,7 @@ def find(
     run : Integrator
     gaits : sequence of Gait
         Tried as starts beside random waves.
-    count, populations, shakes : int
+    count, populations, perturbations : int
         Steady waves that are optimized, populations of waves that change on the way, and perturbations of the
         best optima that are optimized again.
 
@@ -81,46 +74,55 @@ def find(
     NoAnswerError
         If nothing that reaches the end is found.
     """
+    satisfied_m = MANOEUVRE_SOLVER.satisfied * run.robot.length_m
     solver = Solver(run, task)
-    rough = Solver(run, task, ROUGH_STEP_S)
+    rough = Solver(run, task, MANOEUVRE_SEARCH.rough_step_s)
     begun = starts(rough, gaits, count, seed)
     if not begun:
         raise NoAnswerError("no wave gait comes near the end of this manoeuvre; allow more time (--longest)")
-    soft = Solver(smoothed(run, COARSE_FRICTION_M_S), task, ROUGH_STEP_S)
+    soft = Solver(smoothed(run, MANOEUVRE_SEARCH.coarse_friction_m_s), task, MANOEUVRE_SEARCH.rough_step_s)
     pool: list[Candidate] = []
     for k, start in enumerate(begun):
-        plan = soft.solve(start.plan, COARSE_STEPS).plan
-        pool.append(solver.solve(plan, FIRST_STEPS))
+        plan = soft.solve(start.plan, MANOEUVRE_SEARCH.coarse_steps).plan
+        pool.append(solver.solve(plan, MANOEUVRE_SEARCH.first_steps))
         tell(
-            f"start {k + 1} of {len(begun)}: {start.plan.duration_s:.3f} s -> {_word(min(pool, key=_merit))}"
+            f"start {k + 1} of {len(begun)}: {start.plan.duration_s:.3f} s -> "
+            f"{_word(min(pool, key=_merit), satisfied_m)}"
         )
     for k in range(populations):
-        population = bred(rough, begun[0], seed + k)
-        pool.append(solver.solve(population.plan, FIRST_STEPS))
-        tell(f"population {k + 1} of {populations}: {_word(population)} -> {_word(pool[-1])}")
-    pool = sorted(pool, key=_merit)[:POOL]
-    pool[0] = solver.solve(pool[0].plan, LAST_STEPS)
+        population = evolved(rough, begun[0], seed + k)
+        pool.append(solver.solve(population.plan, MANOEUVRE_SEARCH.first_steps))
+        tell(
+            f"population {k + 1} of {populations}: {_word(population, satisfied_m)} -> "
+            f"{_word(pool[-1], satisfied_m)}"
+        )
+    pool = sorted(pool, key=_merit)[: MANOEUVRE_SEARCH.pool]
+    pool[0] = solver.solve(pool[0].plan, MANOEUVRE_SEARCH.last_steps)
     rng = np.random.default_rng(seed)
-    for k in range(shakes):
+    spreads = MANOEUVRE_SEARCH.perturbations_s
+    for k in range(perturbations):
         base = pool[k // 2 % len(pool)] if k % 2 else pool[0]
-        found = solver.solve(shaken(task, base.plan, rng, SHAKE_S[k // 2 % 2]), FIRST_STEPS)
-        if found.merit < pool[0].merit * (1 + CLOSE):
-            found = solver.solve(found.plan, LAST_STEPS)
+        found = solver.solve(
+            perturbed(task, base.plan, rng, spreads[k // 2 % len(spreads)]),
+            MANOEUVRE_SEARCH.first_steps,
+        )
+        if found.merit < pool[0].merit * (1 + MANOEUVRE_SEARCH.refined_share):
+            found = solver.solve(found.plan, MANOEUVRE_SEARCH.last_steps)
         if found.merit < pool[0].merit:
-            tell(f"perturbation {k + 1} of {shakes}: {_word(found)}")
-        pool = sorted([*pool, found], key=_merit)[:POOL]
-    fine = Solver(run, task, FINE_STEP_S)
+            tell(f"perturbation {k + 1} of {perturbations}: {_word(found, satisfied_m)}")
+        pool = sorted([*pool, found], key=_merit)[: MANOEUVRE_SEARCH.pool]
+    fine = Solver(run, task, MANOEUVRE_SEARCH.fine_step_s)
     answers = []
     for candidate in pool[:2]:
         final = on_ticks(fine, candidate.plan)
         answers.append((final, candidate, *certify(run, task, final.plan)))
     final, exact, certificate, trajectory = min(answers, key=lambda a: (not a[2].passed, a[0].merit))
-    if final.worst_m > 100 * SATISFIED_M:
+    if final.worst_m > 100 * satisfied_m:
         raise NoAnswerError(
             f"nothing found reaches the end: the best misses by {1e3 * final.worst_m:.0f} mm; "
             "allow more time (--longest), room or pressure, or try more --starts"
         )
-    solves = 2 * len(begun) + populations + 1 + shakes
+    solves = 2 * len(begun) + populations + 1 + perturbations
     return Manoeuvre(
         final.plan,
         certificate,
@@ -132,11 +134,14 @@ def find(
     )
 
 
-def shaken(task: Task, plan: ValvePlan, rng: np.random.Generator, by_s: float) -> ValvePlan:
+def perturbed(task: Task, plan: ValvePlan, rng: np.random.Generator, by_s: float) -> ValvePlan:
     """Return a plan with every switch moved at random, all of it stretched a little, at another pressure."""
-    stretch = 1 + SHAKE_SHARE * rng.standard_normal()
+    stretch = 1 + MANOEUVRE_SEARCH.perturbation_stretch * rng.standard_normal()
     times = (plan.times() + by_s * rng.standard_normal(plan.switches)) * stretch
-    pressure = np.clip(plan.pressure_kpa + SHAKE_KPA * rng.standard_normal(), *task.bounds.pressure_kpa)
+    pressure = np.clip(
+        plan.pressure_kpa + MANOEUVRE_SEARCH.perturbation_kpa * rng.standard_normal(),
+        *task.bounds.pressure_kpa,
+    )
     if not task.pressure_is_free:
         pressure = plan.pressure_kpa
     moved = plan.with_times(times, plan.duration_s * stretch, float(pressure))
@@ -148,6 +153,6 @@ def _merit(candidate: Candidate) -> float:
     return candidate.merit
 
 
-def _word(candidate: Candidate) -> str:
-    missed = f", misses by {1e3 * candidate.worst_m:.1f} mm" if candidate.worst_m > SATISFIED_M else ""
+def _word(candidate: Candidate, satisfied_m: float) -> str:
+    missed = f", misses by {1e3 * candidate.worst_m:.1f} mm" if candidate.worst_m > satisfied_m else ""
     return f"{candidate.plan.duration_s:.3f} s{missed}"

@@ -14,6 +14,7 @@ from itertools import pairwise
 import casadi as ca
 import numpy as np
 
+from srs_opt.manoeuvre.settings import MANOEUVRE_SOLVER
 from srs_opt.manoeuvre.valves import COINCIDENT_S, ValvePlan
 from srs_opt.model.parameters import Structure
 from srs_opt.model.registry import build, state_layout
@@ -23,8 +24,6 @@ from srs_opt.simulate.kernel import LANES, Course, Kernel
 from srs_opt.simulate.mesh import Mesh
 from srs_opt.simulate.rosenbrock import step_function
 
-# Out of rest derivatives err by 20 % with 2.5 ms, by 1 % with 1 ms; coarser ones cost 0.5 to 2 % of the merit
-STEP_S = 0.00125
 Born = dict[int, list[tuple[int, np.ndarray]]]
 
 
@@ -67,8 +66,10 @@ def jacobian_kernel(structure: Structure) -> Kernel:
     return Kernel(f"step jacobian {structure}", (nx * (nx + 2), structure.segments, count), make)
 
 
-def shoot(run: Integrator, start: np.ndarray, plans: list[ValvePlan], step_s: float = STEP_S) -> list[Shot]:
-    """Simulate several manoeuvres from one state, side by side."""
+def shoot(
+    run: Integrator, start: np.ndarray, plans: list[ValvePlan], step_s: float | None = None
+) -> list[Shot]:
+    """Simulate several manoeuvres from one state, side by side; without a step, with the solver's."""
     shots = []
     for k in range(0, len(plans), LANES):
         some = plans[k : k + LANES]
@@ -81,7 +82,7 @@ def shoot(run: Integrator, start: np.ndarray, plans: list[ValvePlan], step_s: fl
 
 
 def shoot_with_sensitivity(
-    run: Integrator, start: np.ndarray, plan: ValvePlan, step_s: float = STEP_S
+    run: Integrator, start: np.ndarray, plan: ValvePlan, step_s: float | None = None
 ) -> Shot:
     """Simulate a manoeuvre and differentiate it."""
     course = _course(run, start, plan, step_s)
@@ -151,9 +152,9 @@ def _jacobians(run: Integrator, course: Course, states: np.ndarray) -> np.ndarra
     return jacobian
 
 
-def _course(run: Integrator, start: np.ndarray, plan: ValvePlan, step_s: float) -> Course:
+def _course(run: Integrator, start: np.ndarray, plan: ValvePlan, step_s: float | None) -> Course:
     timeline = plan.timeline().at_one_pressure()
-    mesh = Mesh.uniform(timeline.duration_s, step_s, 1)
+    mesh = Mesh.uniform(timeline.duration_s, step_s or MANOEUVRE_SOLVER.step_s, 1)
     p = run.pack(float(timeline.pressure_kpa[0]), 1.0)
     return Course(start, mesh.h_s, timeline.valve.T[mesh.phase], p)
 

@@ -1,9 +1,9 @@
 """All switch times at once: sequential linear programming with exact derivatives in a trust region.
 
 The motion depends on its switch times smoothly but, near sticking friction, with strong curvature; its
-memory is short (velocities and bends decay within a cycle) and only the pose adds up. So one shoot from the
-start is well conditioned, the linear model is right within some milliseconds, and optima lie in corners:
-where dwell, end and room bind. Violations are penalized exactly (L1).
+memory is short (velocities and bends decay within a cycle) and only the pose adds up. So single shooting
+from the start is well conditioned, the linear model is right within some milliseconds, and optima lie in
+corners: where dwell, end and room bind. Violations are penalized exactly (L1).
 """
 
 from __future__ import annotations
@@ -16,19 +16,11 @@ from scipy.optimize import linprog
 
 from srs_opt.manoeuvre.order import OrderRows, standing_s
 from srs_opt.manoeuvre.rows import RowMaker, Rows
-from srs_opt.manoeuvre.shooting import STEP_S, Shot, shoot, shoot_with_sensitivity
+from srs_opt.manoeuvre.settings import MANOEUVRE_SOLVER
+from srs_opt.manoeuvre.shooting import Shot, shoot, shoot_with_sensitivity
 from srs_opt.manoeuvre.task import Task
 from srs_opt.manoeuvre.valves import ValvePlan
 from srs_opt.simulate.integrate import Integrator
-
-PENALTY_PER_M = 20.0  # seconds per metre of violation; a manoeuvre's own price is about 2
-FRACTIONS = (1.0, 0.5, 0.2, 0.05)  # of a step, simulated side by side
-REACH_S, LEAST_REACH_S, MOST_REACH_S = 0.02, 3e-4, 0.08
-PRESSURE_PER_S = 50.0  # kPa that a step may change per second of reach
-SPACE_S_PER_M = 20.0  # price of the disc's radius where it is the objective
-TIME_BESIDE = 0.02  # weight of time where it is not
-SATISFIED_M = 2e-4
-_GAIN_S = 2e-4
 
 
 @dataclass(frozen=True)
@@ -45,9 +37,12 @@ class Candidate:
 class Solver:
     """Optimizes manoeuvres of one task on one model (which holds the friction's smoothing)."""
 
-    def __init__(self, run: Integrator, task: Task, step_s: float = STEP_S) -> None:
+    def __init__(self, run: Integrator, task: Task, step_s: float | None = None) -> None:
         self.run, self.task, self.step_s = run, task, step_s
         self.rows = RowMaker(run, task)
+        length = run.robot.length_m
+        self.penalty_s_m = MANOEUVRE_SOLVER.penalty_s / length
+        self.space_s_m = MANOEUVRE_SOLVER.space_s / length
         self.ages = task.start.ages_s(run.structure.segments)
 
     def judge(self, plans: list[ValvePlan]) -> list[Candidate]:
@@ -63,7 +58,7 @@ class Solver:
         missed = np.minimum(values, 0.0)
         # many rows tell of one overlap: the worst counts, and a little of the others
         price = self._price(shot.plan, radius)
-        merit = price - PENALTY_PER_M * (missed.sum() if values.size < 60 else missed.min() * 3)
+        merit = price - self.penalty_s_m * (missed.sum() if values.size < 60 else missed.min() * 3)
         return Candidate(shot.plan, price, float(merit), float(-missed.min(initial=0.0)))
 
     def _radius(self, shot: Shot) -> float:
@@ -75,9 +70,11 @@ class Solver:
 
     def _price(self, plan: ValvePlan, radius_m: float) -> float:
         if self.task.objective == "space":
-            return SPACE_S_PER_M * radius_m + TIME_BESIDE * plan.duration_s
+            return self.space_s_m * radius_m + MANOEUVRE_SOLVER.time_beside * plan.duration_s
         if self.task.objective == "air":
-            return 0.02 * plan.fills * plan.pressure_kpa / 50.0 + TIME_BESIDE * plan.duration_s
+            return (
+                0.02 * plan.fills * plan.pressure_kpa / 50.0 + MANOEUVRE_SOLVER.time_beside * plan.duration_s
+            )
         return plan.duration_s
 
     def plays(self, plan: ValvePlan) -> bool:
@@ -88,27 +85,29 @@ class Solver:
     def solve(self, plan: ValvePlan, most: int = 60) -> Candidate:
         """Return the local optimum near a manoeuvre."""
         (best,) = self.judge([plan])
-        reach, idle = REACH_S, 0
+        reach, idle = MANOEUVRE_SOLVER.first_reach_s, 0
         steps = 0
-        while steps < most and reach >= LEAST_REACH_S and idle < 4:
+        while steps < most and reach >= MANOEUVRE_SOLVER.least_reach_s and idle < MANOEUVRE_SOLVER.most_idle:
             steps += 1
             shot = shoot_with_sensitivity(self.run, self.task.start.state, best.plan, self.step_s)
             step = self._step(shot, reach)
             if step is None:
                 break
             old = np.concatenate([best.plan.times(), [best.plan.duration_s, best.plan.pressure_kpa]])
-            trials = [best.plan.with_times(*_split(old + f * step)) for f in FRACTIONS]
+            trials = [best.plan.with_times(*_split(old + f * step)) for f in MANOEUVRE_SOLVER.step_fractions]
             found = self.judge([t.trimmed() for t in trials])
             k = int(np.argmin([c.merit for c in found]))
             gain = best.merit - found[k].merit
             if gain > 0:
                 best = found[k]
-                idle = idle + 1 if gain < _GAIN_S else 0
+                idle = idle + 1 if gain < MANOEUVRE_SOLVER.gain_s else 0
                 reach = (
-                    min(2 * reach, MOST_REACH_S) if k == 0 else max(FRACTIONS[k] * 1.5 * reach, LEAST_REACH_S)
+                    min(2 * reach, MANOEUVRE_SOLVER.most_reach_s)
+                    if k == 0
+                    else max(MANOEUVRE_SOLVER.step_fractions[k] * 1.5 * reach, MANOEUVRE_SOLVER.least_reach_s)
                 )
             else:
-                reach *= FRACTIONS[-1] * 4
+                reach *= MANOEUVRE_SOLVER.step_fractions[-1] * 4
             merged = self._without_short_pulses(best)
             if merged is not None:
                 best = merged
@@ -127,7 +126,7 @@ class Solver:
         if not trials:
             return None
         found = min(self.judge(trials), key=lambda c: c.merit)
-        return found if found.merit < best.merit + _GAIN_S else None
+        return found if found.merit < best.merit + MANOEUVRE_SOLVER.gain_s else None
 
     def _step(self, shot: Shot, reach: float) -> np.ndarray | None:
         """Return the linear model's best change of times, duration and pressure; None if there is none."""
@@ -140,10 +139,10 @@ class Solver:
         n, m = plan.switches, rows.values.size
         size = n + 2 + 1 + m  # times, duration, pressure; radius; violations
         cost = np.zeros(size)
-        cost[n] = 1.0 if task.objective == "time" else TIME_BESIDE
+        cost[n] = 1.0 if task.objective == "time" else MANOEUVRE_SOLVER.time_beside
         cost[n + 1] = 0.02 * plan.fills / 50.0 if task.objective == "air" else 0.0
-        cost[n + 2] = SPACE_S_PER_M if task.objective == "space" else 0.0
-        cost[n + 3 :] = PENALTY_PER_M
+        cost[n + 2] = self.space_s_m if task.objective == "space" else 0.0
+        cost[n + 3 :] = self.penalty_s_m
         near = sparse.hstack([sparse.csr_matrix(-rows.jacobian), -sparse.identity(m)])
         dwell, room = self._dwell_rows(plan, size)
         low, high = np.full(size, -np.inf), np.full(size, np.inf)
@@ -152,7 +151,7 @@ class Solver:
         if task.longest_s is not None:
             high[n] = min(high[n], max(task.longest_s - plan.duration_s, low[n]))
         low[n] = max(low[n], 0.05 - plan.duration_s)
-        span = PRESSURE_PER_S * reach
+        span = MANOEUVRE_SOLVER.pressure_kpa_per_s * reach
         low[n + 1] = np.clip(bounds.pressure_kpa[0] - plan.pressure_kpa, -span, span)
         high[n + 1] = np.clip(bounds.pressure_kpa[1] - plan.pressure_kpa, -span, span)
         if not task.pressure_is_free:

@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from srs_opt.gait import Gait, Wave
+from srs_opt.manoeuvre.settings import REGULATOR, WAVE_START
 from srs_opt.manoeuvre.shooting import Shot, shoot
 from srs_opt.manoeuvre.solve import Candidate, Solver
 from srs_opt.manoeuvre.task import Task
@@ -20,34 +21,24 @@ from srs_opt.manoeuvre.valves import COINCIDENT_S, ValvePlan, ValveRow, gait_end
 from srs_opt.model.state import HEADING, X
 from srs_opt.orbit.steady import Orbit
 
-PLANS = 960  # simulated at most, several lengths of time per wave where the end is not merely passed
-WAVES = 30  # per start that is wanted
-FREQUENCY_HZ, LAG_RAD = (1.2, 4.5), (0.6, 1.6)
-PRESSURE_SPAN = 0.4  # share of the limits' width that random pressures take; below it waves are slow
-TIMES = 6  # lengths tried per wave
-FIRST_S = 0.25
-VENT_S = 0.45  # of a stop's first draft
-SETTLINGS = 3.0  # time constants that a gait takes to be reached; more only makes the longest start longer
-SETTLE_S, STAIRS = 0.1, 8  # for a change of pressure, as the planner has it
-ALIKE = 0.004  # merits of starts that are taken for the same
-
 
 def starts(solver: Solver, gaits: Sequence[Gait], count: int, seed: int) -> list[Candidate]:
     """Return the best `count` starts among waves (mirrored and backwards too) and the given gaits."""
     task, segments = solver.task, solver.run.structure.segments
-    waves = WAVES * count
+    waves = WAVE_START.waves * count
     rng = np.random.default_rng(seed)
     low, high = task.bounds.pressure_kpa
     given = task.pressure_kpa
     drawn: list[Gait] = [g if given is None else replace(g, pressure_kpa=given) for g in gaits]
     drawn = [g for g in drawn if given is not None or low <= g.pressure_kpa <= high]
     if not passed(task):
-        waves = min(waves, PLANS // TIMES // 2)
+        waves = min(waves, WAVE_START.plans // WAVE_START.lengths // 2)
         drawn = [drawn[k] for k in rng.permutation(len(drawn))[:waves]]
     turning = task.end.turn_rad is not None or task.end.pose is not None
     backwards = task.end.past_m is not None and task.end.past_m < 0
     for _ in range(waves):
-        frequency, lag, phase = rng.uniform(*FREQUENCY_HZ), rng.uniform(*LAG_RAD), rng.uniform(0, 2 * math.pi)
+        frequency, lag = rng.uniform(*WAVE_START.frequency_hz), rng.uniform(*WAVE_START.lag_rad)
+        phase = rng.uniform(0, 2 * math.pi)
         pressure = task.pressure_kpa or random_pressure_kpa(task, rng)
         offset = (
             0.0 if not turning else rng.uniform(0.0, 0.95) * np.sign(task.end.turn_rad or rng.uniform(-1, 1))
@@ -65,7 +56,7 @@ def starts(solver: Solver, gaits: Sequence[Gait], count: int, seed: int) -> list
     for candidate in judged:
         if len(kept) == count:
             break
-        if all(abs(candidate.merit - k.merit) > ALIKE * abs(k.merit) for k in kept):
+        if all(abs(candidate.merit - k.merit) > WAVE_START.same_merit * abs(k.merit) for k in kept):
             kept.append(candidate)
     return kept
 
@@ -73,7 +64,7 @@ def starts(solver: Solver, gaits: Sequence[Gait], count: int, seed: int) -> list
 def random_pressure_kpa(task: Task, rng: np.random.Generator) -> float:
     """Return a pressure for a wave, most often near the highest: what bends more is mostly faster."""
     low, high = task.bounds.pressure_kpa
-    return float(high - (high - low) * PRESSURE_SPAN * rng.uniform() ** 2)
+    return float(high - (high - low) * WAVE_START.pressure_span * rng.uniform() ** 2)
 
 
 def passed(task: Task) -> bool:
@@ -98,7 +89,7 @@ def _until_arrival(solver: Solver, gaits: Sequence[Gait]) -> list[ValvePlan]:
 
 def arrived(task: Task, shot: Shot) -> int | None:
     """Return the first node at which the line or the heading is passed, None if it never is."""
-    done = shot.time_s >= FIRST_S
+    done = shot.time_s >= WAVE_START.least_s
     turned = shot.states[:, HEADING] - task.start.state[HEADING]
     for wanted, have in ((task.end.past_m, shot.states[:, X]), (task.end.turn_rad, turned)):
         if wanted is not None:
@@ -109,14 +100,14 @@ def arrived(task: Task, shot: Shot) -> int | None:
 def lengths(task: Task, gait: Gait) -> list[ValvePlan]:
     """Return the gait played for several lengths of time, with what the task's start and end ask for."""
     longest = task.longest_s or _likely_s(task)
-    times = np.geomspace(max(longest / 6, FIRST_S), longest, TIMES)
+    times = np.geomspace(max(longest / 6, WAVE_START.least_s), longest, WAVE_START.lengths)
     return [with_end(task, ValvePlan.of_gaits((gait,), float(played))) for played in times]
 
 
 def with_end(task: Task, plan: ValvePlan) -> ValvePlan:
     """Return the plan, playable, with the venting or the gait that the task's end asks for."""
     if task.end.rest:
-        plan = vented(plan, VENT_S)
+        plan = vented(plan, WAVE_START.vent_s)
     if task.end.orbit is not None:
         plan = followed(plan, task.end.orbit.gait, 2)
     return playable(task, plan)
@@ -127,7 +118,7 @@ def _likely_s(task: Task) -> float:
     end = task.end
     way = abs(end.past_m or 0.0) + (math.hypot(*end.pose[:2]) if end.pose else 0.0)
     turn = abs(end.turn_rad or 0.0) + (abs(end.pose[2]) if end.pose else 0.0)
-    return 1.0 + 3.0 * way + 1.5 * turn + SETTLINGS * _settling_s(end.orbit)
+    return 1.0 + 3.0 * way + 1.5 * turn + WAVE_START.settlings * _settling_s(end.orbit)
 
 
 def _settling_s(orbit: Orbit | None) -> float:
@@ -191,6 +182,7 @@ def ramp(task: Task, to_kpa: float) -> tuple[tuple[float, float], ...]:
     """Return the regulator's way from the pressure of the gait before, in stairs."""
     if task.start.gait is None or task.start.gait.pressure_kpa == to_kpa:
         return ()
-    middles = (np.arange(STAIRS) + 0.5) / STAIRS
+    stairs = REGULATOR.stairs
+    middles = (np.arange(stairs) + 0.5) / stairs
     kpa = task.start.gait.pressure_kpa + middles * (to_kpa - task.start.gait.pressure_kpa)
-    return tuple((SETTLE_S * (k + 1) / STAIRS, float(value)) for k, value in enumerate(kpa))
+    return tuple((REGULATOR.settle_s * (k + 1) / stairs, float(value)) for k, value in enumerate(kpa))

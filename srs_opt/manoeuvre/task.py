@@ -16,11 +16,6 @@ from srs_opt.robot import Robot
 from srs_opt.simulate.integrate import Integrator
 
 OBJECTIVES = ("time", "air", "space")
-# At rest: half of these would ask for another tau_1 of venting, 0.06 s, and change the pose by less than 1 mm
-REST_SPEED_M_S, REST_CURVATURE_1_M = 0.01, 0.5
-POSE_M, POSE_RAD = 0.002, 0.01  # tolerances of an end pose
-# In a gait: what is left decays by the gait's multipliers, within a cycle or two
-GAIT_SPEED_M_S, GAIT_CURVATURE_SHARE = 0.02, 0.03
 
 
 @dataclass(frozen=True)

@@ -7,10 +7,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from srs_opt.manoeuvre.settings import MANOEUVRE_SEARCH
 from srs_opt.manoeuvre.solve import Candidate, Solver
 from srs_opt.manoeuvre.valves import COINCIDENT_S, ValvePlan, ValveRow
-
-ROUNDS = 12
 
 
 def on_ticks(solver: Solver, plan: ValvePlan) -> Candidate:
@@ -18,9 +17,9 @@ def on_ticks(solver: Solver, plan: ValvePlan) -> Candidate:
     bounds = solver.task.bounds
     tick = bounds.tick_s
     rounded = _rounded(plan, tick, round(bounds.dwell_s / tick))
-    begun = [_lengthened(rounded, k * tick) for k in range(4)]
+    begun = [_lengthened(rounded, k * tick) for k in range(MANOEUVRE_SEARCH.tick_lengths)]
     best = min(solver.judge([p for p in begun if solver.plays(p)] or [rounded]), key=lambda c: c.merit)
-    for _ in range(ROUNDS):
+    for _ in range(MANOEUVRE_SEARCH.tick_rounds):
         trials = [p for p in _neighbours(best.plan, tick) if solver.plays(p)]
         found = min(solver.judge(trials), key=lambda c: c.merit, default=best)
         if found.merit >= best.merit - 1e-6:

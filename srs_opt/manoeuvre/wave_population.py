@@ -16,20 +16,12 @@ from functools import partial
 import numpy as np
 
 from srs_opt.gait_opt.evolution import evolution
+from srs_opt.manoeuvre.settings import WAVE_POPULATION, WAVE_START
 from srs_opt.manoeuvre.shooting import shoot
 from srs_opt.manoeuvre.solve import Candidate, Solver
-from srs_opt.manoeuvre.starts import FREQUENCY_HZ, LAG_RAD, arrived, passed, random_pressure_kpa, with_end
+from srs_opt.manoeuvre.starts import arrived, passed, random_pressure_kpa, with_end
 from srs_opt.manoeuvre.task import Task
 from srs_opt.manoeuvre.valves import ValvePlan, ValveRow
-
-KNOTS = 6  # of the frequency; four lose 1 % of a standing start, eight gain nothing
-SIZE = 24  # waves per generation
-GENERATIONS = 160  # a standing start gains 0.1 % in as many more
-FIRST = 10  # generations' worth of steady waves, the best of which is the population's middle
-LONGER = 1.15  # than the best steady wave: time that a population has where the end is merely passed
-INSTANTS = 1500  # at which a wave's sign is looked at
-LIMITS_HZ = (0.3, 6.0)
-SPREAD_HZ, SPREAD_LAG, SPREAD_OFFSET, SPREAD_KPA, SPREAD_TIME = 0.6, 0.3, 0.3, 6.0, 0.2
 
 
 @dataclass(frozen=True)
@@ -47,32 +39,45 @@ class Family:
     @property
     def size(self) -> int:
         """Number of genes."""
-        return KNOTS + 7
+        return WAVE_POPULATION.knots + 7
 
     @property
     def spread(self) -> np.ndarray:
         """Standard deviations of a population's first generation."""
         free = 1.0 if self.task.pressure_is_free else 1e-6
         timed = 1e-6 if passed(self.task) else 1.0
-        rest = [1.5, *[SPREAD_LAG] * 2, *[SPREAD_OFFSET] * 2, free * SPREAD_KPA, timed * SPREAD_TIME]
-        return np.array([SPREAD_HZ] * KNOTS + rest)
+        rest = [
+            WAVE_POPULATION.spread_phase,
+            *[WAVE_POPULATION.spread_lag] * 2,
+            *[WAVE_POPULATION.spread_offset] * 2,
+            free * WAVE_POPULATION.spread_kpa,
+            timed * WAVE_POPULATION.spread_log_time,
+        ]
+        return np.array([WAVE_POPULATION.spread_hz] * WAVE_POPULATION.knots + rest)
 
     def steady(self, rng: np.random.Generator) -> np.ndarray:
         """Return the genes of a random steady wave."""
-        frequency, lag = rng.uniform(*FREQUENCY_HZ), rng.choice((-1, 1)) * rng.uniform(*LAG_RAD)
+        frequency, lag = (
+            rng.uniform(*WAVE_START.frequency_hz),
+            rng.choice((-1, 1)) * rng.uniform(*WAVE_START.lag_rad),
+        )
         offset = rng.uniform(-0.95, 0.95) * rng.integers(2)
         pressure = random_pressure_kpa(self.task, rng)
         time = 0.0 if passed(self.task) else math.log(rng.uniform(0.3, 1.2))
         phase = rng.uniform(0, 2 * math.pi)
-        return np.array([*[frequency] * KNOTS, phase, lag, lag, offset, offset, pressure, time])
+        return np.array(
+            [*[frequency] * WAVE_POPULATION.knots, phase, lag, lag, offset, offset, pressure, time]
+        )
 
     def plan(self, genes: np.ndarray) -> ValvePlan:
         """Return what the valves do, playable, with what the task's end asks for."""
-        phase, lag, later_lag, offset, later_offset, pressure, time = genes[KNOTS:]
+        phase, lag, later_lag, offset, later_offset, pressure, time = genes[WAVE_POPULATION.knots :]
         played = self.played_s * math.exp(min(time, 1.0))
-        at = np.linspace(0.0, played, INSTANTS)
+        at = np.linspace(0.0, played, WAVE_POPULATION.instants)
         share = at / played
-        frequency = np.interp(share, np.linspace(0, 1, KNOTS), genes[:KNOTS]).clip(*LIMITS_HZ)
+        frequency = np.interp(
+            share, np.linspace(0, 1, WAVE_POPULATION.knots), genes[: WAVE_POPULATION.knots]
+        ).clip(*WAVE_POPULATION.limits_hz)
         cycles = np.concatenate([[0.0], np.cumsum((frequency[1:] + frequency[:-1]) / 2 * np.diff(at))])
         lags, offsets = lag + (later_lag - lag) * share, offset + (later_offset - offset) * share
         rows = []
@@ -88,7 +93,7 @@ class Family:
         return with_end(self.task, ValvePlan(tuple(rows), played, kpa))
 
 
-def bred(solver: Solver, begun: Candidate, seed: int) -> Candidate:
+def evolved(solver: Solver, begun: Candidate, seed: int) -> Candidate:
     """Return the best of a population of waves that change on the way.
 
     Parameters
@@ -97,10 +102,10 @@ def bred(solver: Solver, begun: Candidate, seed: int) -> Candidate:
         The best steady wave; its duration says how much time the task takes.
     """
     task = solver.task
-    played = begun.plan.duration_s * (LONGER if passed(task) else 1.0)
+    played = begun.plan.duration_s * (WAVE_POPULATION.longer if passed(task) else 1.0)
     family = Family(task, solver.run.structure.segments, min(played, task.longest_s or math.inf))
     rng = np.random.default_rng(seed)
-    first = [family.steady(rng) for _ in range(FIRST * SIZE)]
+    first = [family.steady(rng) for _ in range(WAVE_POPULATION.first_generations * WAVE_POPULATION.size)]
     judged = _judged(solver, family, first)
     middle = first[min(range(len(first)), key=lambda k: judged[k].merit)]
     best = min(judged, key=lambda c: c.merit)
@@ -110,8 +115,8 @@ def bred(solver: Solver, begun: Candidate, seed: int) -> Candidate:
         middle,
         family.spread,
         seed=seed + 1,
-        popsize=SIZE,
-        maxiter=GENERATIONS,
+        popsize=WAVE_POPULATION.size,
+        maxiter=WAVE_POPULATION.generations,
     )
     for candidates, _ in generations:
         best = min([best, *candidates], key=lambda c: c.merit)
