@@ -17,7 +17,6 @@ import casadi as ca
 
 from srs_opt.effects.effect import Effect
 from srs_opt.effects.generic_hooks import (
-    LEAST,
     across,
     along,
     beyond_edge,
@@ -38,6 +37,7 @@ from srs_opt.effects.generic_hooks import (
     with_grain,
 )
 from srs_opt.effects.parameter import Component, Direction, EffectParameter, Scale, link, segment
+from srs_opt.effects.settings import TERM
 
 # what acts
 ALONG, ACROSS = "friction along the wheels", "friction across the wheels"
@@ -285,7 +285,8 @@ _ENTRIES = (
     _swings("gain_swing_fast", 1.4),
     _Entry("time_drift", "actuation", TIME, "with time", (_p("per_s", "1/s", 0.12),),
            "all segments become slower during a trial, by {size} per second",
-           {"slowness": lambda e, a: ca.fmax(1 + e["per_s"] * a.time_s, LEAST), "timed": True}, _PERCENT),
+           {"slowness": lambda e, a: ca.fmax(1 + e["per_s"] * a.time_s, TERM.least_factor), "timed": True},
+           _PERCENT),
     # camera
     _Entry("camera_lens", "measurement", CAMERA, "with place in the room", (_p("per_m2", "1/m^2", 0.05),),
            "the picture is stretched with the square of the distance from its origin, by {size} per m^2",

@@ -8,31 +8,26 @@ from typing import Any
 import casadi as ca
 
 from srs_opt.effects.effect import Actuation, LinkState, Symbols, to_body_frame
-
-BLUR_M_S = 2e-4  # half the width of a change with the direction of motion, as in reverse_friction
-EDGE_BLUR_M = 0.005  # of a line on the floor: a wheel's width
-LEAST_S = 0.005  # of a lag: what is shorter no camera sees, and steps would have to be as short
-LEAST_WIDTH = 0.5  # 1/m, of a play: likewise
-LEAST = 0.02  # what is left of friction or load at least where a term would take all and more
+from srs_opt.effects.settings import SMOOTHING, TERM
 
 Factor = Callable[[Symbols, LinkState], ca.SX]
 
 
 def along(factor: Factor) -> dict[str, Any]:
     """Return the hook of a factor on the friction along the wheels."""
-    return {"wheel_factors": lambda e, s: (ca.fmax(factor(e, s), LEAST), 1.0)}
+    return {"wheel_factors": lambda e, s: (ca.fmax(factor(e, s), TERM.least_factor), 1.0)}
 
 
 def across(factor: Factor) -> dict[str, Any]:
     """Return the hook of a factor on the friction across the wheels."""
-    return {"wheel_factors": lambda e, s: (1.0, ca.fmax(factor(e, s), LEAST))}
+    return {"wheel_factors": lambda e, s: (1.0, ca.fmax(factor(e, s), TERM.least_factor))}
 
 
 def on_both(factor: Factor) -> dict[str, Any]:
     """Return the hook of a factor on both frictions, as of the load."""
 
     def both(e: Symbols, s: LinkState) -> tuple[ca.SX, ca.SX]:
-        f = ca.fmax(factor(e, s), LEAST)
+        f = ca.fmax(factor(e, s), TERM.least_factor)
         return f, f
 
     return {"wheel_factors": both}
@@ -40,7 +35,7 @@ def on_both(factor: Factor) -> dict[str, Any]:
 
 def sign(v: ca.SX) -> ca.SX:
     """Return the direction of a speed, -1 to 1."""
-    return ca.tanh(v / BLUR_M_S)
+    return ca.tanh(v / SMOOTHING.reversal_m_s)
 
 
 def place_on_body(count: int) -> ca.DM:
@@ -61,7 +56,7 @@ def with_grain(e: Symbols, s: LinkState) -> ca.SX:
 
 def beyond_edge(e: Symbols, s: LinkState) -> ca.SX:
     """Return 1 beyond a line on the floor, 0 before it."""
-    return (1 + ca.tanh((towards(e, s) - e["edge_m"]) / (2 * EDGE_BLUR_M))) / 2
+    return (1 + ca.tanh((towards(e, s) - e["edge_m"]) / (2 * SMOOTHING.edge_m))) / 2
 
 
 def drag(e: Symbols, s: LinkState) -> tuple[ca.SX, ca.SX]:
@@ -108,13 +103,13 @@ def late(side: float) -> dict[str, Any]:
 
     return {
         "command": lambda e, a: a.valve - side * e["ratio"] * ca.fmax(asked(a.valve) - a.memory, 0),
-        "state_rate": lambda e, a: (asked(a.valve) - a.memory) / ca.fmax(e["lag_s"], LEAST_S),
+        "state_rate": lambda e, a: (asked(a.valve) - a.memory) / ca.fmax(e["lag_s"], TERM.least_lag_s),
     }
 
 
 def slack(e: Symbols, rate: ca.SX, memory: ca.SX) -> ca.SX:
     """Return the rate of a play that is taken up over a width of bend; none where there is no width."""
-    return (e["width"] > 0) * (rate - ca.fabs(rate) * memory / ca.fmax(e["width"], LEAST_WIDTH))
+    return (e["width"] > 0) * (rate - ca.fabs(rate) * memory / ca.fmax(e["width"], TERM.least_play_1_m))
 
 
 def swing(e: Symbols, a: Actuation) -> ca.SX:

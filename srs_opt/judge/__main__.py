@@ -20,8 +20,9 @@ from srs_opt.command import (
 
 if TYPE_CHECKING:
     from srs_opt.judge.manoeuvres import Played
-    from srs_opt.judge.opinion import Opinion, Tolerance
+    from srs_opt.judge.opinion import Opinion
     from srs_opt.judge.replay import Replay
+    from srs_opt.judge.settings import AgreementSettings
     from srs_opt.robot import Robot
 
 SHOWN = 30  # rows of the printed table
@@ -72,8 +73,8 @@ def build_parser() -> Parser:
 def run(options: argparse.Namespace) -> Answer:
     """Read, play, compare."""
     from srs_opt.errors import InputError
-    from srs_opt.judge.opinion import Tolerance
     from srs_opt.judge.registry import DART, JUDGES
+    from srs_opt.judge.settings import AgreementSettings
     from srs_opt.robot import load_robot
 
     judge = JUDGES.named(options.engine)
@@ -83,7 +84,7 @@ def run(options: argparse.Namespace) -> Answer:
     name = Path(options.file).name
     if judge is not DART and name in ("plan.json", "motion.json", "manoeuvre.json"):
         raise InputError(f"--engine {judge.name}: a plan or a manoeuvre is played by {DART.name} only")
-    tolerance = Tolerance(options.tolerance, 1.5 * options.tolerance)
+    tolerance = AgreementSettings(options.tolerance, 1.5 * options.tolerance)
     if name in ("plan.json", "motion.json"):
         return _motion(options, robot)
     if name == "manoeuvre.json":
@@ -92,20 +93,21 @@ def run(options: argparse.Namespace) -> Answer:
 
 
 def _motion(options: argparse.Namespace, robot: Robot) -> Answer:
-    from srs_opt.judge.gaits import Settings
     from srs_opt.judge.replay import load_motion, replay
+    from srs_opt.judge.settings import EngineSettings
     from srs_opt.judge.walls import solid_region
 
     motion = load_motion(options.file)
     walls = solid_region(motion["maze"])
-    return _beside(options, robot, "drive", lambda: replay(robot, motion, Settings(options.step)), walls)
+    settings = EngineSettings(options.step)
+    return _beside(options, robot, "drive", lambda: replay(robot, motion, settings), walls)
 
 
 def _manoeuvre(options: argparse.Namespace, robot: Robot) -> Answer:
-    from srs_opt.judge.gaits import Settings
     from srs_opt.judge.manoeuvres import load_manoeuvre, replay_manoeuvre
+    from srs_opt.judge.settings import EngineSettings
 
-    asked = (*load_manoeuvre(options.file, robot), chosen_model(options, robot), Settings(options.step))
+    asked = (*load_manoeuvre(options.file, robot), chosen_model(options, robot), EngineSettings(options.step))
     return _beside(options, robot, "manoeuvre", lambda: replay_manoeuvre(robot, *asked), None)
 
 
@@ -129,18 +131,18 @@ def _beside(
     return Answer(answer, seen.in_words(), seen.agrees, tuple(files))
 
 
-def _gaits(options: argparse.Namespace, robot: Robot, tolerance: Tolerance) -> Answer:
+def _gaits(options: argparse.Namespace, robot: Robot, tolerance: AgreementSettings) -> Answer:
     import shutil
     import time
 
     from srs_opt.files import write_json
     from srs_opt.judge.cases import cases_of
     from srs_opt.judge.figures import draw_opinions
-    from srs_opt.judge.gaits import Settings
     from srs_opt.judge.opinion import opinions
+    from srs_opt.judge.settings import EngineSettings
     from srs_opt.parallel.sweep import Resume
 
-    model, settings = chosen_model(options, robot), Settings(options.step)
+    model, settings = chosen_model(options, robot), EngineSettings(options.step)
     cases = cases_of(options.file, robot, options.pressure, options.refine, options.seed)
     unfinished = options.out / "judge.unfinished"  # an interrupted run goes on from here
     begun = time.perf_counter()

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from dart_snake.body import Body, Link
 from dart_snake.engine import Pull
 from srs_opt.errors import InputError
+from srs_opt.judge.settings import REPLAY
 from srs_opt.robot import Robot
 
 Array = NDArray[np.float64]
-TETHER_SPEED_M_S = 1e-3  # below which a dragging tether pulls less; of no account to a snake that moves
 # what a camera or a clock adds does not move the robot, and a delay of all valves moves it later
 IGNORED = ("marker_offset", "camera_scale", "camera_tilt", "clock_offset", "dead_time")
 BODY = ("gap_length", "head_mass", "tether_weight", "viscous_rolling", "wheel_toe", "single_wheel_toe")
@@ -111,7 +111,7 @@ def pull_of(robot: Robot, *, room: bool) -> Pull | None:
     anchor = values.get("tether_pull", {"force_n": 0.0, "ax_m": 0.0, "ay_m": 0.0})
 
     def pull(_: float, x: float, y: float, vx: float, vy: float) -> tuple[float, float, float]:
-        brake = damping + drag / math.sqrt(vx * vx + vy * vy + TETHER_SPEED_M_S**2)
+        brake = damping + drag / math.sqrt(vx * vx + vy * vy + REPLAY.tether_speed_m_s**2)
         dx, dy = float(anchor["ax_m"]) - x, float(anchor["ay_m"]) - y
         towards = float(anchor["force_n"]) / max(math.hypot(dx, dy), 1e-9)
         return towards * dx - brake * vx, towards * dy - brake * vy, 0.0

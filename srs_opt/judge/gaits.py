@@ -11,40 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dart_snake.bending import Lags, respond
-from dart_snake.engine import STEP_S, Snake
+from dart_snake.engine import Snake
 from srs_opt.gait import Gait
 from srs_opt.judge.bodies import body_of, drive_of, pull_of
+from srs_opt.judge.settings import ENGINE, SETTLING, EngineSettings
 from srs_opt.robot import Robot
 from srs_opt.simulate.cycle_motion import CycleMotion, cycle_motion
 
 Array = NDArray[np.float64]
-SAMPLES = 48  # rows per cycle
-LEAST_CYCLES, MOST_CYCLES = 6, 80
-# what is left of the approach to the steady motion, over a cycle's displacement; the approach is geometric,
-# and the last two changes tell its ratio
-SETTLED = 5e-4
-SLOWEST_RATIO = 0.95
-LEVER_M = 0.1  # turn rates weigh as speeds at this distance, half the built-in robot's length
-LEAST_M_S = 2e-5  # change of speed that is never asked about
-UNSETTLED_CYCLES = 12  # that are averaged when cycles never repeat
-
-
-@dataclass(frozen=True)
-class Settings:
-    """How finely the engine plays.
-
-    Attributes
-    ----------
-    step_s : float
-    pairs : int
-        Of hinges per segment.
-    """
-
-    step_s: float = STEP_S
-    pairs: int = 1
-
-
-DEFAULT_SETTINGS = Settings()
 
 
 @dataclass(frozen=True)
@@ -87,7 +61,7 @@ class Judged:
 
 
 def judge_gait(
-    robot: Robot, gait: Gait, settings: Settings = DEFAULT_SETTINGS, *, refine: bool = False
+    robot: Robot, gait: Gait, settings: EngineSettings = ENGINE, *, refine: bool = False
 ) -> Judged:
     """Return a gait's steady motion in the engine; with `refine`, at half the step, with its error."""
     coarse = _steady(robot, gait, settings)
@@ -101,11 +75,11 @@ def judge_gait(
     return replace(fine, speed_error_m_s=speed, turn_rate_error_rad_s=turn)
 
 
-def _steady(robot: Robot, gait: Gait, settings: Settings) -> Judged:
+def _steady(robot: Robot, gait: Gait, settings: EngineSettings) -> Judged:
     """Play cycles from rest until they repeat."""
     steps = max(math.ceil(gait.period_s / settings.step_s - 1e-9), 1)
     step_s = gait.period_s / steps
-    every = max(steps // SAMPLES, 1)
+    every = max(steps // SETTLING.samples_per_cycle, 1)
     snake = Snake(body_of(robot), step_s=step_s, pairs=settings.pairs, pull=pull_of(robot, room=False))
     durations, valves = gait.phases()
     shared = np.ones(durations.size)
@@ -115,7 +89,7 @@ def _steady(robot: Robot, gait: Gait, settings: Settings) -> Judged:
     before = snake.look()
     motions: list[CycleMotion] = []
     settled = False
-    while not settled and len(motions) < MOST_CYCLES:
+    while not settled and len(motions) < SETTLING.most_cycles:
         curvature, rate, lags = respond(lags, durations, drive, (robot.tau1_s, robot.tau2_s), times)
         played = snake.play(curvature, rate, every)
         x, y, theta = (
@@ -129,20 +103,23 @@ def _steady(robot: Robot, gait: Gait, settings: Settings) -> Judged:
         pose[:, :2] -= origin
         motions.append(cycle_motion(time_s, pose, (x - origin[0]).T, (y - origin[1]).T, robot.body_width_m))
         before = played
-        settled = len(motions) >= LEAST_CYCLES and _has_settled(motions)
-    last = motions[-1:] if settled else motions[-UNSETTLED_CYCLES:]
+        settled = len(motions) >= SETTLING.least_cycles and _has_settled(motions, robot.length_m)
+    last = motions[-1:] if settled else motions[-SETTLING.averaged_cycles :]
     speed = float(np.mean([m.speed_m_s for m in last]))
     turn = float(np.mean([m.turn_rate_rad_s for m in last]))
     radius = last[-1].radius_m if settled or last[-1].radius_m is None else speed / turn
     return Judged(speed, turn, radius, None, None, len(motions), settled)
 
 
-def _has_settled(motions: Sequence[CycleMotion]) -> bool:
-    """Whether what the coming cycles can still change is small."""
-    rates = np.array([[m.speed_m_s, m.turn_rate_rad_s * LEVER_M] for m in motions[-4:]])
+def _has_settled(motions: Sequence[CycleMotion], length_m: float) -> bool:
+    """Whether what the coming cycles can still change is small: changes fall geometrically, so that the sum
+    of all that are to come is the last one times ratio / (1 - ratio)."""
+    lever_m = SETTLING.lever_body * length_m
+    rates = np.array([[m.speed_m_s, m.turn_rate_rad_s * lever_m] for m in motions[-4:]])
     changes = np.hypot(*np.diff(rates, axis=0).T)
     ratio = min(
-        max(changes[-1] / max(changes[-2], 1e-12), changes[-2] / max(changes[-3], 1e-12)), SLOWEST_RATIO
+        max(changes[-1] / max(changes[-2], 1e-12), changes[-2] / max(changes[-3], 1e-12)),
+        SETTLING.slowest_ratio,
     )
     left = changes.max() * ratio / (1 - ratio)
-    return bool(left < max(SETTLED * math.hypot(*rates[-1]), LEAST_M_S))
+    return bool(left < max(SETTLING.remaining_share * math.hypot(*rates[-1]), SETTLING.least_change_m_s))

@@ -15,16 +15,14 @@ from srs_opt.errors import InputError
 from srs_opt.gait import Gait, check_gait
 from srs_opt.geometry import rotate
 from srs_opt.judge.bodies import body_of, pull_of
-from srs_opt.judge.gaits import DEFAULT_SETTINGS, Settings
 from srs_opt.judge.replay import Drift, Phases, length_m, play_blind, whole_step_s
+from srs_opt.judge.settings import ENGINE, REPLAY, EngineSettings
 from srs_opt.orbit.body import integrator
 from srs_opt.robot import Robot
 from srs_opt.simulate.timeline import Timeline
 from srs_opt.simulate.valve_file import read_valves
 
 Array = NDArray[np.float64]
-# of the gait that a manoeuvre begins in: the built-in table's slowest multiplier leaves 3 % of a disturbance
-CYCLES_BEFORE = 12
 
 
 @dataclass(frozen=True)
@@ -85,14 +83,14 @@ def replay_manoeuvre(
     valves: Timeline,
     before: Gait | None,
     model: str = "complex",
-    settings: Settings = DEFAULT_SETTINGS,
+    settings: EngineSettings = ENGINE,
 ) -> Played:
     """Play a manoeuvre here and in the engine, both from rest (and some cycles of the gait before).
 
     A constant delay of the valves only shifts both in time and is left out.
     """
     robot = robot.with_values(valve_delay_s=0.0)
-    lead_s = 0.0 if before is None else CYCLES_BEFORE * before.period_s
+    lead_s = 0.0 if before is None else REPLAY.cycles_before * before.period_s
     whole = valves if before is None else Timeline.join([Timeline.of_gait(before, lead_s), valves])
     run = integrator(robot, model)
     path = run.integrate(whole, run.rest())
@@ -114,6 +112,7 @@ def replay_manoeuvre(
         "manoeuvre",
         float(np.hypot(*(there[-1] - here[-1]))),
         length_m(here),
+        robot.length_m,
         times - (times[0] if before is not None else 0.0),
         there,
         lines,

@@ -9,35 +9,13 @@ from typing import Any
 
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait, check_gait
-from srs_opt.judge.gaits import DEFAULT_SETTINGS, Judged, Settings
+from srs_opt.judge.gaits import Judged
 from srs_opt.judge.registry import DART, JUDGES
+from srs_opt.judge.settings import AGREEMENT, ENGINE, REPLAY, AgreementSettings, EngineSettings
 from srs_opt.orbit.steady import steady_gait
 from srs_opt.parallel import executor
 from srs_opt.parallel.sweep import Resume, sweep
 from srs_opt.robot import Robot
-
-# Agreement: contact solvers and step sizes leave a few parts in a thousand, another friction law 40 %.
-SPEED_SHARE, SPEED_M_S = 0.02, 0.002
-# A straight gait has no turn rate to take a share of: 2 mm/s at 0.1 m from the middle of the body.
-TURN_SHARE, TURN_RAD_S = 0.03, 0.02
-SHARP_M_S = 3e-4  # our friction is smoothed over no more than this: theirs is not smoothed at all
-
-
-@dataclass(frozen=True)
-class Tolerance:
-    """Up to which differences two motions agree: a share of ours, or that much where it is more."""
-
-    speed_share: float = SPEED_SHARE
-    turn_share: float = TURN_SHARE
-    speed_m_s: float = SPEED_M_S
-    turn_rate_rad_s: float = TURN_RAD_S
-
-    def to_record(self) -> dict[str, float]:
-        """Return the JSON object."""
-        return dict(vars(self))
-
-
-DEFAULT_TOLERANCE = Tolerance()
 
 
 @dataclass(frozen=True)
@@ -56,7 +34,7 @@ class Opinion:
     name: str
     ours: Ours
     judge: Judged
-    tolerance: Tolerance
+    tolerance: AgreementSettings
 
     @property
     def agrees(self) -> bool:
@@ -93,8 +71,8 @@ class Opinion:
 
 
 def ours_of(robot: Robot, gait: Gait, model: str | None) -> Ours:
-    """Return our steady motion with friction at least as sharp as `SHARP_M_S`."""
-    sharp = robot.with_values(friction_speed_m_s=min(robot.friction_speed_m_s, SHARP_M_S))
+    """Return our steady motion, with friction no more smoothed than `ReplaySettings` says."""
+    sharp = robot.with_values(friction_speed_m_s=min(robot.friction_speed_m_s, REPLAY.friction_speed_m_s))
     try:
         orbit = steady_gait(sharp, gait, model)
     except NoAnswerError:
@@ -107,8 +85,8 @@ def opinion_on(
     name: str,
     gait: Gait,
     model: str | None = None,
-    settings: Settings = DEFAULT_SETTINGS,
-    tolerance: Tolerance = DEFAULT_TOLERANCE,
+    settings: EngineSettings = ENGINE,
+    tolerance: AgreementSettings = AGREEMENT,
     *,
     refine: bool = True,
     engine: str = DART.name,
@@ -138,8 +116,8 @@ def opinions(
     robot: Robot,
     cases: Sequence[Case],
     model: str | None = None,
-    settings: Settings = DEFAULT_SETTINGS,
-    tolerance: Tolerance = DEFAULT_TOLERANCE,
+    settings: EngineSettings = ENGINE,
+    tolerance: AgreementSettings = AGREEMENT,
     *,
     jobs: int = 1,
     cluster: str | None = None,
@@ -160,7 +138,7 @@ def opinions(
 
 
 def _chunk(
-    robot: Robot, model: str | None, settings: Settings, engine: str, cases: Sequence[Case]
+    robot: Robot, model: str | None, settings: EngineSettings, engine: str, cases: Sequence[Case]
 ) -> list[Any]:
     """Return the opinions on some gaits as JSON holds them."""
     found = []

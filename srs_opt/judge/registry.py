@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 from srs_opt.gait import Gait
 from srs_opt.judge.bodies import check_engine, check_robot
-from srs_opt.judge.gaits import Judged, Settings, judge_gait
+from srs_opt.judge.gaits import Judged, judge_gait
+from srs_opt.judge.settings import EngineSettings
 from srs_opt.registry import Registry
 from srs_opt.robot import Robot
 
@@ -30,10 +31,10 @@ class Judge:
     name: str
     check_engine: Callable[[], None]
     check_robot: Callable[[Robot], None]
-    judge_gait: Callable[[Robot, Gait, Settings, bool], Judged]
+    judge_gait: Callable[[Robot, Gait, EngineSettings, bool], Judged]
 
 
-def _dart(robot: Robot, gait: Gait, settings: Settings, refine: bool) -> Judged:
+def _dart(robot: Robot, gait: Gait, settings: EngineSettings, refine: bool) -> Judged:
     return judge_gait(robot, gait, settings, refine=refine)
 
 

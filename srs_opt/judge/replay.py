@@ -18,18 +18,12 @@ from srs_opt.document import read_json
 from srs_opt.errors import InputError
 from srs_opt.gait import Gait
 from srs_opt.judge.bodies import body_of, drive_of, pull_of, slope_of
-from srs_opt.judge.gaits import DEFAULT_SETTINGS, Settings
+from srs_opt.judge.settings import AGREEMENT, ENGINE, REPLAY, EngineSettings
 from srs_opt.judge.walls import boxes_of, clearances, solid_region
 from srs_opt.robot import Robot
 
 Array = NDArray[np.float64]
 VERSION = 2  # of motion.json
-STAIR_S = 0.005  # of a changing pressure
-ROW_STEPS = 10  # steps from one look at the body to the next
-# How far the engine, open loop, may be from our motion, over the distance travelled until then: small
-# differences of speed and turn rate add up.
-DRIFT_SHARE = 0.03
-LEAST_DRIFT_M = 0.01
 
 
 @dataclass(frozen=True)
@@ -53,6 +47,8 @@ class Drift:
     drift_m, way_m : float
         How far the centre of mass is from where we have it, in the end or at the first contact; length of our
         way until then.
+    body_m : float
+        Length of the robot.
     time_s, centre, lines : arrays (n,), (n, 2), (n, points, 2)
         The motion, body included.
     ours : array (m, 2)
@@ -62,6 +58,7 @@ class Drift:
     name: str
     drift_m: float
     way_m: float
+    body_m: float
     time_s: Array
     centre: Array
     lines: Array
@@ -70,7 +67,8 @@ class Drift:
     @property
     def agrees(self) -> bool:
         """Whether the motions stay together until the end, or until drift has led to a wall."""
-        return self.drift_m <= max(DRIFT_SHARE * self.way_m, LEAST_DRIFT_M)
+        least_m = AGREEMENT.least_drift_body * self.body_m
+        return self.drift_m <= max(AGREEMENT.drift_share * self.way_m, least_m)
 
     def to_record(self) -> dict[str, Any]:
         """Return what judge.json says of every motion that is played."""
@@ -151,7 +149,7 @@ def load_motion(file: str) -> dict[str, Any]:
     return record
 
 
-def replay(robot: Robot, motion: Mapping[str, Any], settings: Settings = DEFAULT_SETTINGS) -> Replay:
+def replay(robot: Robot, motion: Mapping[str, Any], settings: EngineSettings = ENGINE) -> Replay:
     """Play the last run of a motion (the drive, where it was driven) from rest at the maze's start.
 
     Raises
@@ -187,6 +185,7 @@ def replay(robot: Robot, motion: Mapping[str, Any], settings: Settings = DEFAULT
         run["name"],
         float(np.hypot(*(centre[last] - there))),
         length_m(until),
+        robot.length_m,
         seen.time_s,
         centre,
         seen.line_m,
@@ -198,7 +197,7 @@ def replay(robot: Robot, motion: Mapping[str, Any], settings: Settings = DEFAULT
     )
 
 
-def whole_step_s(duration_s: float, settings: Settings) -> float:
+def whole_step_s(duration_s: float, settings: EngineSettings) -> float:
     """Return the step nearest below the wanted one that divides the duration."""
     return duration_s / math.ceil(duration_s / settings.step_s - 1e-9)
 
@@ -210,7 +209,7 @@ def play_blind(robot: Robot, snake: Snake, phases: Phases) -> tuple[Motion, Arra
     times = np.asarray(np.arange(1, steps + 1) * snake.step_s, dtype=np.float64)
     tau = (robot.tau1_s, robot.tau2_s)
     curvature, rate, _ = respond(Lags.rest(robot.segments), phases.duration_s, drive, tau, times)
-    seen = snake.play(curvature, rate, ROW_STEPS)
+    seen = snake.play(curvature, rate, REPLAY.steps_per_row)
     masses = np.array([link.mass_kg for link in snake.body.links])
     return seen, np.stack([seen.x_m @ masses, seen.y_m @ masses], axis=1) / masses.sum()
 
@@ -249,7 +248,7 @@ def _cycle(entry: Mapping[str, Any]) -> Phases:
     edges = np.concatenate([[0.0], np.cumsum(durations)])
     ramp_s = float(entry.get("ramp_s", 0.0))
     if ramp_s > 0:
-        edges = np.union1d(edges, np.linspace(0.0, ramp_s, math.ceil(ramp_s / STAIR_S) + 1))
+        edges = np.union1d(edges, np.linspace(0.0, ramp_s, math.ceil(ramp_s / REPLAY.stair_s) + 1))
         edges = edges[np.append(True, np.diff(edges) > 1e-9)]
     middles = (edges[:-1] + edges[1:]) / 2
     valve = np.stack([gait.valve(t) for t in middles], axis=1)

@@ -11,16 +11,11 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from srs_opt.errors import InputError, NoAnswerError
 from srs_opt.parallel.protocol import Groups, Shared, Work
+from srs_opt.parallel.settings import CLUSTER
 
 if TYPE_CHECKING:
     from distributed import Client, Future
 
-CONNECT_S = 10.0  # patience with a scheduler that does not answer
-WORKERS_S = 30.0  # patience with a scheduler that has no workers, at the start and later
-POLL_S = 5.0  # between two looks whether there are workers
-GATHER_S = 30.0  # for fetching results that are ready, then whether there are workers is looked at again
-SHARE = 4  # items of one task: enough to fill the lanes of compiled code
-AHEAD = 3  # pieces per thread that are under way
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -45,10 +40,10 @@ def opened(address: str) -> Iterator[Cluster]:
         log.setLevel(logging.CRITICAL + 1)  # what goes wrong is told once, by us
     try:
         try:
-            client = Client(address, timeout=CONNECT_S)
+            client = Client(address, timeout=CLUSTER.connect_s)
         except (OSError, ValueError, TimeoutError) as error:
             raise InputError(
-                f"--cluster {address}: no Dask scheduler answers there within {CONNECT_S:g} s "
+                f"--cluster {address}: no Dask scheduler answers there within {CLUSTER.connect_s:g} s "
                 "(expected host:port)"
             ) from error
         try:
@@ -57,7 +52,7 @@ def opened(address: str) -> Iterator[Cluster]:
             yield cluster
         finally:
             with contextlib.suppress(OSError, TimeoutError):
-                client.close(timeout=CONNECT_S)
+                client.close(timeout=CLUSTER.connect_s)
     finally:
         for log, level in zip(logs, before):
             log.setLevel(level)
@@ -83,20 +78,20 @@ class Cluster:
         Raises
         ------
         InputError
-            If none comes within ``WORKERS_S``.
+            If none comes within ``CLUSTER.workers_s``.
         """
         try:
-            self._client.wait_for_workers(1, timeout=WORKERS_S)
+            self._client.wait_for_workers(1, timeout=CLUSTER.workers_s)
         except TimeoutError as error:
             raise InputError(
                 f"--cluster {self._address}: the scheduler has no worker, and none came within "
-                f"{WORKERS_S:g} s; start one: dask worker {self._address}"
+                f"{CLUSTER.workers_s:g} s; start one: dask worker {self._address}"
             ) from error
 
     def map(self, work: Callable[[T], R], pieces: Sequence[T]) -> Iterator[R]:
         """Yield ``work(piece)`` of all pieces in order; a piece whose worker is lost goes to another."""
         under_way: deque[Future] = deque()
-        width = AHEAD * max(1, sum(self._client.nthreads().values()))
+        width = CLUSTER.pieces_per_thread * max(1, sum(self._client.nthreads().values()))
         rest = iter(pieces)
         while True:
             while len(under_way) < width and (piece := next(rest, None)) is not None:
@@ -132,7 +127,7 @@ class Cluster:
         try:
             while True:
                 try:
-                    wait(tasks, timeout=POLL_S)
+                    wait(tasks, timeout=CLUSTER.poll_s)
                     return self._gathered(tasks)
                 except (NotYet, TimeoutError):
                     self._look_for_workers()
@@ -154,7 +149,7 @@ class Cluster:
         async def gather() -> list[Any]:
             return list(await self._client.gather(list(tasks), asynchronous=True))
 
-        return list(self._client.sync(gather, callback_timeout=GATHER_S))
+        return list(self._client.sync(gather, callback_timeout=CLUSTER.gather_s))
 
     def _look_for_workers(self) -> None:
         if self._client.nthreads():
@@ -162,9 +157,10 @@ class Cluster:
             return
         now = time.monotonic()
         self._alone_since = self._alone_since or now
-        if now - self._alone_since > WORKERS_S:
+        if now - self._alone_since > CLUSTER.workers_s:
             raise NoAnswerError(
-                f"--cluster {self._address}: all workers were lost, and none came back within {WORKERS_S:g} s"
+                f"--cluster {self._address}: all workers were lost, and none came back within "
+                f"{CLUSTER.workers_s:g} s"
             )
 
 
@@ -177,8 +173,8 @@ class _Carried:
     def ask(self, names: Sequence[str], request: Any) -> dict[str, Any]:
         """Return the items' answers."""
         tasks = []
-        for first in range(0, len(names), SHARE):
-            some = names[first : first + SHARE]
+        for first in range(0, len(names), CLUSTER.items_per_task):
+            some = names[first : first + CLUSTER.items_per_task]
             memory = self._work.memory(some, request)
             tasks.append(self._cluster.submit(answered, self._work.part(some), some, memory, request))
         found: dict[str, Any] = {}

@@ -12,14 +12,14 @@ pytest.importorskip("dartpy", reason="the package 'dartpy' is not installed (ext
 
 from srs_opt.gait import Wave
 from srs_opt.judge.__main__ import main
-from srs_opt.judge.gaits import Settings
 from srs_opt.judge.replay import phases_of, replay
+from srs_opt.judge.settings import EngineSettings
 from srs_opt.judge.walls import clearances, solid_region
 from srs_opt.robot import wpi_srs
 
 ROBOT = wpi_srs()
 GAIT = Wave.uniform(4, 2.0, 41.0, 0.9).gait()
-COARSE = Settings(2e-3)
+COARSE = EngineSettings(2e-3)
 
 
 def motion(rings: list, cycles: int = 3, goal_x: float = 9.0) -> dict:

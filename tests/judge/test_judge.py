@@ -12,8 +12,9 @@ from srs_opt.errors import InputError
 from srs_opt.gait import Wave, published_wave
 from srs_opt.judge.__main__ import main
 from srs_opt.judge.bodies import check_engine
-from srs_opt.judge.gaits import Settings, judge_gait
+from srs_opt.judge.gaits import judge_gait
 from srs_opt.judge.opinion import opinion_on
+from srs_opt.judge.settings import EngineSettings
 from srs_opt.robot import Robot, wpi_srs
 from srs_opt.simulate.timeline import Timeline
 from srs_opt.simulate.valve_file import write_valves
@@ -26,7 +27,7 @@ ROBOT = wpi_srs()
 
 def test_the_published_gait_with_its_error():
     """0.2296 to 0.2301 m/s there; steps and hinges say how far off these numbers are."""
-    them = opinion_on(ROBOT, "published", published_wave(ROBOT).gait(), None, Settings(1.5e-3))
+    them = opinion_on(ROBOT, "published", published_wave(ROBOT).gait(), None, EngineSettings(1.5e-3))
     assert them.judge.speed_m_s == pytest.approx(0.2300, abs=5e-4)
     assert 0 < them.judge.speed_error_m_s < 0.002
     assert them.judge.settled
@@ -35,7 +36,7 @@ def test_the_published_gait_with_its_error():
 
 def test_a_turning_gait_backwards():
     gait = Wave.uniform(4, 2.0, 41.0, 0.9, 0.4).gait().reversed_wave()
-    them = opinion_on(ROBOT, "back", gait, None, Settings(2e-3), refine=False)
+    them = opinion_on(ROBOT, "back", gait, None, EngineSettings(2e-3), refine=False)
     assert them.agrees
     assert them.judge.speed_m_s < -0.3
     assert them.judge.radius_m * them.judge.turn_rate_rad_s == pytest.approx(them.judge.speed_m_s, rel=1e-6)
@@ -60,7 +61,7 @@ def test_a_manoeuvre_from_rest_and_out_of_a_gait(begun, tmp_path, capsys):
 def test_soft_silicone():
     """0.246 m/s there (0.231 when stiff), three hinges per segment in this engine within 2.5 % of it."""
     soft = ROBOT.with_values(bending_stiffness_n_m2=0.005, bending_relaxation_s=0.005)
-    them = judge_gait(soft, published_wave(ROBOT).gait(), Settings(2e-3))
+    them = judge_gait(soft, published_wave(ROBOT).gait(), EngineSettings(2e-3))
     assert them.speed_m_s == pytest.approx(0.246, rel=0.025)
 
 
@@ -94,7 +95,7 @@ def laboratory(robot: Robot, effects: list[dict], offset: float) -> tuple[float,
 def test_links_and_effects_move_it_as_they_do_in_the_laboratory(links, effects):
     robot = ROBOT.with_values(links=links, effects=effects)
     gait = published_wave(robot, offset=0.3).gait()
-    them = judge_gait(robot, gait, Settings(2e-3))
+    them = judge_gait(robot, gait, EngineSettings(2e-3))
     speed, turn = laboratory(robot, effects, 0.3)
     bow = them.turn_rate_rad_s * gait.period_s / 2  # displacement over arc
     assert them.speed_m_s * math.sin(bow) / bow == pytest.approx(speed, rel=0.02)

@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -19,6 +20,10 @@ from virtual_lab.draw import draw_truth
 from virtual_lab.trials import small_design
 
 ANSWERED = dask.answered
+
+
+def set_patience(monkeypatch, **seconds):
+    monkeypatch.setattr(dask, "CLUSTER", replace(dask.CLUSTER, **seconds))
 
 
 def answered_unless_killed(mark, work, names, *rest):
@@ -54,7 +59,7 @@ def test_a_worker_is_lost_and_the_calibration_has_the_same_bits(tmp_path, monkey
 
 
 def test_no_scheduler_is_a_line(monkeypatch):
-    monkeypatch.setattr(dask, "CONNECT_S", 0.5)
+    set_patience(monkeypatch, connect_s=0.5)
     with (
         pytest.raises(InputError, match=r"no Dask scheduler answers there within 0\.5 s"),
         executor(cluster="127.0.0.1:1"),
@@ -64,7 +69,7 @@ def test_no_scheduler_is_a_line(monkeypatch):
 
 @pytest.mark.filterwarnings("default")
 def test_a_scheduler_without_workers_is_a_line(monkeypatch):
-    monkeypatch.setattr(dask, "WORKERS_S", 0.3)
+    set_patience(monkeypatch, workers_s=0.3)
     with (
         local_cluster(0) as cluster,
         pytest.raises(InputError, match=r"no worker, and none came within 0\.3 s; start one: dask worker"),
@@ -115,8 +120,7 @@ def test_a_lost_scheduler_is_told(tmp_path):
 
 @pytest.mark.filterwarnings("default")
 def test_all_workers_lost_is_told(monkeypatch):
-    monkeypatch.setattr(dask, "WORKERS_S", 0.3)
-    monkeypatch.setattr(dask, "POLL_S", 0.1)
+    set_patience(monkeypatch, workers_s=0.3, poll_s=0.1)
     with local_cluster(1) as cluster, executor(cluster=cluster.scheduler_address) as where:
         results = where.map(cubes_then_sleep, range(4))
         assert next(results) == 0
@@ -128,7 +132,7 @@ def test_all_workers_lost_is_told(monkeypatch):
 def test_a_result_lost_with_its_worker_is_told(monkeypatch):
     """A result is ready, but nobody is left from whom it could be fetched."""
     distributed = pytest.importorskip("distributed")
-    monkeypatch.setattr(dask, "WORKERS_S", 0.0)
+    set_patience(monkeypatch, workers_s=0.0)
     monkeypatch.setattr(distributed, "wait", lambda tasks, timeout: None)
 
     class Alone:

@@ -6,14 +6,13 @@ import casadi as ca
 
 from srs_opt.effects.effect import Effect, Symbols
 from srs_opt.effects.parameter import EffectParameter
-
-# Sign changes of the bend are spread over this curvature (1/m), half a per mille of a full bend, and lie on
-# the negative side: a straight segment does not bend against its valve, so a start from rest is exact.
-_SIGN_WIDTH_1_M = 0.01
+from srs_opt.effects.settings import SMOOTHING
 
 
 def _slow_down(e: Symbols, valve: ca.SX, kappa: ca.SX) -> ca.SX:
-    against = 0.5 * (1 - ca.tanh(valve * kappa / _SIGN_WIDTH_1_M + 2))
+    # + 2: the change of sign lies on the negative side, so that a straight segment (kappa 0) does not bend
+    # against its valve and a start from rest is exact
+    against = 0.5 * (1 - ca.tanh(valve * kappa / SMOOTHING.curvature_1_m + 2))
     return 1 + e["ratio"] * against * valve * valve  # a vented segment bends against nothing
 
 
