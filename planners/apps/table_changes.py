@@ -6,18 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from planners.motion.table import STILL, courses
-from planners.motion.transitions import SPEED_MARGIN, Progress, every_cycle
+from planners.motion.settings import MOTION_TABLE
+from planners.motion.table import courses
+from planners.motion.transitions import Progress, every_cycle
 from planners.motion.valves import ValveLimits
 from srs_opt.gait_opt.changes import LEVELS, Changes
 from srs_opt.gait_opt.table import GaitTable, TableGait
 from srs_opt.model.state import FORWARD, POSE
 from srs_opt.orbit.body import integrator
 from srs_opt.robot import Robot
-
-# Of the fastest gait's speed in the direction of the gait before: at these its cycle begins, whose ends are
-# the levels. Wider ones interpolate worse between, narrower ones leave speeds out that occur.
-SHARES = (0.0, 0.4, 0.85)
 
 
 def with_changes(
@@ -39,7 +36,8 @@ def with_changes(
     fastest, slowest = max(0.0, *speeds), min(0.0, *speeds)
 
     def levels(entry: TableGait) -> np.ndarray:
-        return np.array(SHARES) * SPEED_MARGIN * (fastest if entry.speed_m_s >= 0 else slowest)
+        shares = np.array(MOTION_TABLE.controller_levels)
+        return shares * MOTION_TABLE.speed_margin * (fastest if entry.speed_m_s >= 0 else slowest)
 
     speed, moved = np.zeros((n + 1, LEVELS)), np.zeros((n + 1, n, LEVELS, 4))
     for before, (begun, cycles) in enumerate(every_cycle(run, table, limits, levels, progress)):
@@ -48,5 +46,5 @@ def with_changes(
             moved[before, now, level] = (*samples[-1, POSE], last[FORWARD])
     speed[n], moved[n] = np.linspace(-1e-3, 1e-3, LEVELS), moved[n, :, :1]  # from rest: one speed only
     steady = np.array([entry.displacement for entry in table.gaits])
-    course = np.append(courses(steady, STILL * robot.body_width_m), 0.0)
+    course = np.append(courses(steady, MOTION_TABLE.still * robot.body_width_m), 0.0)
     return replace(table, changes=Changes.of_floats(speed, course, moved))

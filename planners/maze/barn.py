@@ -1,7 +1,7 @@
 """BARN worlds (Gazebo SDF): upright cylinders, boxes and spheres seen from above.
 
-The bounds are the box around them and `PAD_M` more on every side: the BARN benchmark drives to
-a goal 3 m beyond its field. Document types and entities are refused, so nothing can be expanded.
+The bounds are the box around them and `MAP_FILE.world_margin_m` more on every side: the BARN benchmark
+drives to a goal 3 m beyond its field. Document types and entities are refused, so nothing can be expanded.
 """
 
 from __future__ import annotations
@@ -17,13 +17,12 @@ import shapely
 
 from planners.maze.maze import MAX_EXTENT_M, Maze
 from planners.maze.places import Pose
+from planners.maze.settings import MAP_FILE
 from planners.maze.walls import Walls
 from srs_opt.errors import InputError
 from srs_opt.files import read_text
 from srs_opt.geometry import rotate
 
-PAD_M = 4.0
-UPRIGHT_RAD = 0.05
 MAX_BODIES = 100_000
 Shape = tuple[Any, float]
 _UNIT = "<model><link><collision><geometry>{}</geometry></collision></link></model>"
@@ -53,7 +52,8 @@ def read_world(text: str, source: str) -> Maze:
         raise InputError(f"{source}: no obstacles in it (expected models with cylinders or boxes)")
     walls = Walls.of(shapes)
     boxes = walls.boxes()
-    low, high = boxes[:, :2].min(axis=0) - PAD_M, boxes[:, 2:].max(axis=0) + PAD_M
+    margin_m = MAP_FILE.world_margin_m
+    low, high = boxes[:, :2].min(axis=0) - margin_m, boxes[:, 2:].max(axis=0) + margin_m
     bounds = (float(low[0]), float(low[1]), float(high[0]), float(high[1]))
     return Maze(Path(source).stem, bounds, walls, source=source)
 
@@ -153,7 +153,7 @@ def _pose(element: ElementTree.Element | None, where: str) -> Pose:
             f"{where}: its pose is relative to another frame, which is not supported; give it in the world's"
         )
     x, y, _, roll, pitch, yaw = _numbers(element.text, 6, where, "pose")
-    if max(abs(math.remainder(roll, math.pi)), abs(math.remainder(pitch, math.pi))) > UPRIGHT_RAD:
+    if max(abs(math.remainder(roll, math.pi)), abs(math.remainder(pitch, math.pi))) > MAP_FILE.upright_rad:
         raise InputError(
             f"{where}: it is tilted (roll {roll:g}, pitch {pitch:g}); expected upright obstacles"
         )

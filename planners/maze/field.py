@@ -16,11 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from planners.maze.maze import Maze
 from planners.maze.raster import Raster
+from planners.maze.settings import DISTANCE
 
-DEFAULT_RESOLUTION_M = 0.005
-DEFAULT_NODES = 4_000_000
 """Without a wanted resolution the table grows to this many nodes, or one per cell of an occupancy grid."""
-MAX_NODES = 16_500_000
 """Bound on the table's size: finer tables are coarsened (peak memory about 30 bytes per node)."""
 
 _HALF_DIAGONAL = math.sqrt(0.5)
@@ -84,9 +82,9 @@ class DistanceField:
         cls,
         maze: Maze,
         resolution_m: float | None = None,
-        max_nodes: int = MAX_NODES,
+        max_nodes: int | None = None,
         *,
-        finest_m: float = DEFAULT_RESOLUTION_M,
+        finest_m: float | None = None,
     ) -> DistanceField:
         """Tabulate `maze`.
 
@@ -96,12 +94,14 @@ class DistanceField:
         resolution_m : float, optional
             Spacing of the nodes; by default `finest_m`, or coarser in wide mazes. Taken larger where the
             table would exceed `max_nodes`, and fitted to the cells of an occupancy grid.
-        max_nodes : int
-            Bound on the number of nodes, which bounds memory.
-        finest_m : float
-            Finest spacing that is taken by default.
+        max_nodes : int, optional
+            Bound on the number of nodes, which bounds memory; by default that of `DISTANCE`.
+        finest_m : float, optional
+            Finest spacing that is taken by default; without, that of `DISTANCE`.
         """
-        spacing = _spacing(maze, resolution_m, max_nodes, finest_m)
+        spacing = _spacing(
+            maze, resolution_m, max_nodes or DISTANCE.most_nodes, finest_m or DISTANCE.finest_m
+        )
         columns = max(1, math.ceil(maze.width_m / spacing - 1e-9))
         rows = max(1, math.ceil(maze.height_m / spacing - 1e-9))
         origin = (maze.bounds[0] + spacing / 2, maze.bounds[1] + spacing / 2)
@@ -123,7 +123,7 @@ class DistanceField:
         ):
             edge = np.maximum(inward, 0.0).astype(np.float32).reshape(shape)
             np.minimum(values, edge, out=values)
-        # interpolating a function of slope 1 errs by the distance to the far nodes at most; float32 rounds
+        # distance has a gradient of 1, so interpolation errs by the way to the far nodes at most; float32 rounds
         rounding = 1e-6 * max(1.0, maze.width_m, maze.height_m)
         return cls(values, origin, spacing, maze.bounds, node_error + _HALF_DIAGONAL * spacing + rounding)
 
@@ -136,7 +136,7 @@ def _spacing(maze: Maze, wanted: float | None, max_nodes: int, finest_m: float) 
         return max(math.sqrt(maze.width_m * maze.height_m / nodes), max(maze.width_m, maze.height_m) / nodes)
 
     if wanted is None:
-        wanted = max(finest_m, min(at_least(DEFAULT_NODES), cell or math.inf))
+        wanted = max(finest_m, min(at_least(DISTANCE.nodes), cell or math.inf))
     spacing = max(wanted, at_least(max_nodes))
     if cell is None:
         return spacing

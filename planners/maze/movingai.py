@@ -17,9 +17,9 @@ import numpy as np
 from planners.maze.maze import Maze
 from planners.maze.places import Goal, Pose, RobotSize
 from planners.maze.raster import MAX_CELLS, Raster
+from planners.maze.settings import MAP_FILE
 from srs_opt.errors import InputError
 
-DEFAULT_CELL_M = 0.1
 """Maps have no unit of length; with this, one cell is as wide as a slim gait needs."""
 PASSABLE = b".GS123456789abcdefghijklmnopqrstuvwxyz"
 BLOCKED = b"@OTW"
@@ -37,7 +37,7 @@ def read_map(data: bytes, source: str, cell_m: float | None = None) -> Maze:
     InputError
         Naming the line.
     """
-    cell = cell_m or DEFAULT_CELL_M
+    cell = cell_m or MAP_FILE.movingai_cell_m
     lines = data.removeprefix(BOM_UTF8).replace(b"\r\n", b"\n").split(b"\n")
     while len(lines) > 1 and not lines[-1].strip():
         lines.pop()

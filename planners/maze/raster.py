@@ -11,6 +11,7 @@ import shapely
 from numpy.typing import NDArray
 
 from planners.maze.places import Box, Pose
+from planners.maze.settings import DISTANCE
 from srs_opt.geometry import rotate, rotate_back
 
 Unknown = Literal["wall", "free"]
@@ -18,9 +19,6 @@ Unknown = Literal["wall", "free"]
 
 MAX_CELLS = 64_000_000
 """Larger grids are refused: 8000 x 8000 cells."""
-
-_CELLS_AT_ONCE = 1_000_000
-_REACH = 16  # cells about a point that are looked at without a search
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,8 +102,8 @@ class Raster:
         at = self.to_grid(np.asarray(points, dtype=float)) / self.cell_m
         home, nearest = np.floor(at).astype(np.int64), limit_m / self.cell_m
         open_still, reach = np.arange(len(at)), 1
-        while open_still.size and reach <= _REACH:
-            many = max(1, _CELLS_AT_ONCE // (2 * reach + 1) ** 2)
+        while open_still.size and reach <= DISTANCE.looked_cells:
+            many = max(1, DISTANCE.cells_at_once // (2 * reach + 1) ** 2)
             for first in range(0, open_still.size, many):
                 some = open_still[first : first + many]
                 nearest[some] = np.minimum(nearest[some], self._among(at[some], home[some], reach))
@@ -141,7 +139,7 @@ class Raster:
         """Return the distance of `local` to the nearest occupied cell of the window."""
         best = math.inf
         rows, columns = window
-        band = max(1, _CELLS_AT_ONCE // max(1, columns.stop - columns.start))  # bounds the memory
+        band = max(1, DISTANCE.cells_at_once // max(1, columns.stop - columns.start))  # bounds the memory
         for first in range(rows.start, rows.stop, band):
             cells = np.argwhere(self.occupied[first : min(first + band, rows.stop), columns])
             best = min(best, self._nearest_of(local, cells + (first, columns.start), best))

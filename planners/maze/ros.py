@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from planners.maze.maze import MAX_EXTENT_M, Maze
 from planners.maze.places import Pose
 from planners.maze.raster import MAX_CELLS, Raster, Unknown
+from planners.maze.settings import MAP_FILE
 from planners.maze.walls import Walls
 from srs_opt.document import Document, load_schema, validate
 from srs_opt.errors import InputError
@@ -36,7 +37,6 @@ MAX_IMAGE_BYTES = 256_000_000
 FORMATS = ("PPM", "PNG", "BMP", "JPEG", "TIFF")
 IMAGES = "PGM, PNG, BMP, JPEG or TIFF image"
 UNKNOWN_GREY = 205
-LOSSY_LEVELS = 4  # grey levels by which JPEG moves flat areas
 
 
 def maze_from_map_server(document: Document, unknown: Unknown = "wall") -> Maze:
@@ -113,7 +113,7 @@ def _pixels(path: Path) -> tuple[NDArray[np.float32], int]:
                 width, height = image.size
                 if width * height > MAX_CELLS:
                     raise InputError(f"{path}: {width} x {height} pixels are too many (limit {MAX_CELLS})")
-                return _grey(image), LOSSY_LEVELS if image.format == "JPEG" else 0
+                return _grey(image), MAP_FILE.lossy_levels if image.format == "JPEG" else 0
     except InputError:
         raise
     except UnidentifiedImageError as error:  # its own message shows an object's address

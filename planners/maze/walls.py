@@ -17,10 +17,7 @@ import shapely
 from numpy.typing import NDArray
 
 from planners.maze.places import Box
-
-QUADRANT_CHORDS = 16
-# a polygon of 4 * QUADRANT_CHORDS corners on a circle this much larger contains the disc
-_CONTAIN = 1.0 / math.cos(math.pi / (4 * QUADRANT_CHORDS))
+from planners.maze.settings import DISTANCE
 
 
 def _no_shapes() -> NDArray[Any]:
@@ -58,7 +55,7 @@ class Walls:
         thick = self.radii > 0
         if thick.any():
             outlines[thick] = shapely.buffer(
-                self.skeletons[thick], self.radii[thick] * _CONTAIN, quad_segs=QUADRANT_CHORDS
+                self.skeletons[thick], self.radii[thick] * DISTANCE.containing, quad_segs=DISTANCE.chords
             )
         return outlines
 
@@ -73,7 +70,7 @@ class Walls:
 
     @cached_property
     def _slack(self) -> float:
-        return float(self.radii.max(initial=0.0)) * (_CONTAIN - 1.0) * 1.01 + 1e-9
+        return float(self.radii.max(initial=0.0)) * (DISTANCE.containing - 1.0) * 1.01 + 1e-9
 
     def distance(
         self, geometries: NDArray[Any], limit_m: float | NDArray[np.float64] = math.inf

@@ -13,15 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planners.motion.deviation import cycle_deviation_m
+from planners.motion.settings import MOTION_TABLE
 from planners.motion.table import SAMPLES, MotionTable
-from planners.motion.transitions import (
-    LEVELS,
-    STEP_S,
-    Progress,
-    Transitions,
-    motion_table,
-    simulate_transitions,
-)
+from planners.motion.transitions import Progress, Transitions, motion_table, simulate_transitions
 from planners.motion.valves import DEFAULT_LIMITS, ValveLimits
 from srs_opt.files import atomic_path
 from srs_opt.gait_opt.robust import stiffness_deviation
@@ -42,7 +36,8 @@ def table_key(robot: Robot, table: GaitTable, limits: ValveLimits = DEFAULT_LIMI
     ]
     joints = [*astuple(limits), REGULATOR.settle_s, REGULATOR.stair_s]
     parts = json.dumps(
-        [robot.fingerprint(), table.model, LEVELS, SAMPLES, STEP_S, joints, gaits], sort_keys=True
+        [robot.fingerprint(), table.model, MOTION_TABLE.levels, SAMPLES, MOTION_TABLE.step_s, joints, gaits],
+        sort_keys=True,
     )
     return hashlib.sha256(parts.encode()).hexdigest()[:16]
 

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planners.motion.bending import Bending
+from planners.motion.settings import MOTION_TABLE
 from planners.motion.valves import Joint, Joints
 from srs_opt.geometry import compose, points_in_room
 
-STILL = 0.25  # body widths per cycle; what moves less has no direction of travel
 SAMPLES = 16  # intervals per cycle at which pose and body are kept
 
 Array = NDArray[np.float64]
@@ -196,7 +196,7 @@ class MotionTable:
         The mean heading swings within a cycle; the direction of travel in the steady state is the chord of
         a cycle less half its turn. Gaits that back up point against their heading.
         """
-        return np.append(courses(self.steady, STILL * self.body_width_m), 0.0)
+        return np.append(courses(self.steady, MOTION_TABLE.still * self.body_width_m), 0.0)
 
     @cached_property
     def steady_speed_m_s(self) -> Array:

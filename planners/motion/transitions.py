@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planners.motion.cycles import CycleRun
+from planners.motion.settings import MOTION_TABLE
 from planners.motion.table import SAMPLES, MotionTable
 from planners.motion.valves import DEFAULT_LIMITS, Joints, ValveLimits
 from srs_opt.errors import NoAnswerError
@@ -26,10 +27,6 @@ from srs_opt.simulate.batched import Search, run_batched
 from srs_opt.simulate.integrate import Integrator
 from srs_opt.simulate.rosenbrock import VELOCITY
 from srs_opt.simulate.shapes import centre_lines
-
-LEVELS = 8  # forward speeds per gait before
-STEP_S = 0.003  # 1e-4 of the distance travelled in a cycle
-SPEED_MARGIN = 1.1  # the levels reach beyond the fastest gait by this factor
 
 Progress = Callable[[Iterable[int]], Iterator[int]]
 
@@ -70,9 +67,9 @@ def simulate_transitions(
     run = integrator(robot, table.model)
     n = len(table.gaits)
     levels = _speed_levels(table)
-    speed = np.empty((n + 1, LEVELS))
-    after = np.empty((n + 1, n, LEVELS))
-    pose = np.empty((n + 1, n, LEVELS, SAMPLES + 1, 3))
+    speed = np.empty((n + 1, MOTION_TABLE.levels))
+    after = np.empty((n + 1, n, MOTION_TABLE.levels))
+    pose = np.empty((n + 1, n, MOTION_TABLE.levels, SAMPLES + 1, 3))
     kappa = np.empty((n + 1, n, SAMPLES + 1, robot.segments))
     rows = every_cycle(run, table, limits, lambda entry: levels, progress)
     for before, (begun, cycles) in enumerate(rows):
@@ -83,7 +80,7 @@ def simulate_transitions(
             kappa[before, now] = samples[:, run.layout.kappa]
             after[before, now, level] = last[VELOCITY][0]
     # from rest there is one speed only: equal levels, spaced so that they can be looked up
-    speed[n] = np.linspace(-1e-3, 1e-3, LEVELS)
+    speed[n] = np.linspace(-1e-3, 1e-3, MOTION_TABLE.levels)
     after[n], pose[n] = after[n, :, :1], pose[n, :, :1]
     return Transitions(speed, *(a.astype(np.float32) for a in (after, pose, kappa)))
 
@@ -114,7 +111,7 @@ def every_cycle(
     """
     joints = Joints(table, limits)
     n = len(table.gaits)
-    plain = [CycleRun(run, joints.timeline(k, k), STEP_S) for k in range(n)]
+    plain = [CycleRun(run, joints.timeline(k, k), MOTION_TABLE.step_s) for k in range(n)]
     for before in progress(range(n + 1)):
         if before == n:
             ends = [run.rest()]
@@ -124,7 +121,7 @@ def every_cycle(
         cycles = [
             plain[now]
             if joints.is_plain(before, now)
-            else CycleRun(run, joints.timeline(before, now), STEP_S)
+            else CycleRun(run, joints.timeline(before, now), MOTION_TABLE.step_s)
             for now in following
         ]
         outcomes = _all([cycle(_at_origin(start)) for cycle in cycles for start in ends])
@@ -152,7 +149,8 @@ def motion_table(
 
 def _speed_levels(table: GaitTable) -> np.ndarray:
     speeds = [entry.speed_m_s for entry in table.gaits]
-    return np.linspace(SPEED_MARGIN * min(0.0, *speeds), SPEED_MARGIN * max(0.0, *speeds), LEVELS)
+    margin = MOTION_TABLE.speed_margin
+    return np.linspace(margin * min(0.0, *speeds), margin * max(0.0, *speeds), MOTION_TABLE.levels)
 
 
 def _ends(run: Integrator, entry: TableGait, cycle: CycleRun, speeds: np.ndarray) -> list[np.ndarray]:

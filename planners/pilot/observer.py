@@ -15,28 +15,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from planners.pilot.pose import Sighting
+from planners.pilot.settings import OBSERVER
 from srs_opt.geometry import rotate_back
 from srs_opt.measurement.chain import Chain, link_positions, position_jacobian
 from srs_opt.model.state import FORWARD, POSE, SIDEWAYS
 from srs_opt.simulate.integrate import Trajectory
 
 Array = NDArray[np.float64]
-# Standard deviations. Noise of a marker, and of a pose: with what the model lacks. Offset: the last cycle's
-# error, kept wide so that the camera always wins. Drift: 20 % of the speed of a fast gait; half of it ignores
-# a hose for several cycles, double makes noise into speed.
-MARKER_SD_M = 0.002
-POSE_SD = np.array([0.0015, 0.0015, 0.01])
-OFFSET_SD = np.array([0.05, 0.05, 0.3])
-DRIFT_SD = np.array([0.1, 0.1, 0.3])  # per s
-LATENCY_SD_S = 0.05  # before the first cycle
-LATENCY_WALK_S = 0.001  # that the latency may change by from cycle to cycle
-LONGEST_LATENCY_S = 0.3
 
 
 @dataclass(frozen=True)
@@ -44,7 +35,7 @@ class Latency:
     """The time by which sightings are late, and how well it is known."""
 
     value_s: float = 0.0
-    sd_s: float = LATENCY_SD_S
+    sd_s: float = field(default_factory=lambda: OBSERVER.latency_s)
 
 
 @dataclass(frozen=True)
@@ -108,15 +99,15 @@ def correct(
     at = np.array([s.time_s - begin_s - late for s in within])
     configuration, rate = _interpolated(motion, at)
     blocks = [_rows(*entry, chain) for entry in zip(within, at, configuration, rate)]
-    known_sd = math.hypot(latency.sd_s, LATENCY_WALK_S)
-    prior = np.diag(1 / np.array([*OFFSET_SD, *DRIFT_SD, known_sd]))
+    known_sd = math.hypot(latency.sd_s, OBSERVER.latency_change_s)
+    prior = np.diag(1 / np.array([*OBSERVER.offset, *OBSERVER.drift, known_sd]))
     matrix = np.concatenate([*(rows for rows, _ in blocks), prior])
     wanted = np.concatenate([*(misses for _, misses in blocks), np.zeros(7)])
     found, *_ = np.linalg.lstsq(matrix, wanted, rcond=None)
     sd = math.sqrt(np.linalg.inv(matrix.T @ matrix)[6, 6])
     left = wanted - matrix @ found
-    total = min(max(late + float(found[6]), -LONGEST_LATENCY_S), LONGEST_LATENCY_S)
-    residual_m = MARKER_SD_M * float(np.sqrt((left[:-7] ** 2).mean()))
+    total = min(max(late + float(found[6]), -OBSERVER.longest_latency_s), OBSERVER.longest_latency_s)
+    residual_m = OBSERVER.marker_m * float(np.sqrt((left[:-7] ** 2).mean()))
     return Correction(
         found[:3], found[3:6], Latency(total, sd), residual_m, float((left**2).sum()), len(within)
     )
@@ -153,14 +144,14 @@ def _rows(
         measured = sighting.pose.copy()
         measured[2] = _in_turn(measured[2], configuration[2])
         misses, by_pose, speed = measured - configuration[:3], np.eye(3), rate[:3]
-        sd = POSE_SD
+        sd = np.array(OBSERVER.pose)
     else:
         jacobian = position_jacobian(chain, configuration).reshape(-1, chain.unknowns)
         misses = (sighting.markers_m - link_positions(chain, configuration)).ravel()
         seen = np.isfinite(misses)
         jacobian, misses = jacobian[seen], misses[seen]
         by_pose, speed = jacobian[:, :3], jacobian @ rate
-        sd = np.full(misses.size, MARKER_SD_M)
+        sd = np.full(misses.size, OBSERVER.marker_m)
     rows = np.column_stack([by_pose, by_pose * at_s, -speed])
     return rows / sd[:, None], misses / sd
 

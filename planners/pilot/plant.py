@@ -20,6 +20,7 @@ from planners.pilot.observer import Latency, correct, straight_pose
 from planners.pilot.pose import Camera, Sighting
 from planners.pilot.protocol import Status
 from planners.pilot.record import DriveLog
+from planners.pilot.settings import PILOT
 from planners.pilot.valve_line import Clock, ValveLine
 from planners.plan.certify import clearances
 from planners.search.problem import Problem
@@ -34,17 +35,6 @@ from srs_opt.simulate.shapes import centre_lines
 from srs_opt.simulate.timeline import Timeline
 
 Array = NDArray[np.float64]
-POLL_S = 0.004
-LOOK_S = 0.04  # between two checks of the motion against the walls
-LEAST_LEAD_S = 0.04  # before the cycle's end, to which the line's and the driver's own time are added
-MOST_LEAD = 0.6  # of a cycle: with less of it seen, its end cannot be predicted
-POSE_LOST_S = 0.25  # three times the longest gap of a camera that loses every marker for a few frames
-# Lengths in body lengths.
-STRAY = 0.339  # from the predicted motion: a robot that was lifted, pushed, or that does not move at all
-REMEMBERED_S = 3.0  # of sightings: longer than any cycle
-REST_S, REST = 0.3, 0.00847  # places of so long within so much: it stands still
-LONGEST_COAST_S = 4.0
-CONTACT = -0.00847  # foreseen clearance at which it is better to vent than to go on
 
 
 class PilotedPlant:
@@ -163,13 +153,13 @@ class PilotedPlant:
         motions = [run.integrate(timeline, self.state) for run in self._runs]
         begin_s = self._wait_for_cycle(cycles)
         self._log.played(begin_s, timeline)
-        lead_s = 0.0 if ends else min(self._lead_s(), MOST_LEAD * timeline.end_s)
+        lead_s = 0.0 if ends else min(self._lead_s(), PILOT.most_lead * timeline.end_s)
         end_s = begin_s + timeline.end_s - lead_s
-        look_s = begin_s + LOOK_S
+        look_s = begin_s + PILOT.check_s
         while self._clock.now() < end_s:
             self._wait()
             if self._clock.now() > look_s:
-                look_s += LOOK_S
+                look_s += PILOT.check_s
                 self._watch(motions[int(self._misfits.argmin())], begin_s)
         self._look()
         corrections = [correct(m, begin_s, self._seen, self.latency, self._chain) for m in motions]
@@ -185,7 +175,7 @@ class PilotedPlant:
 
     def _lead_s(self) -> float:
         """Return how long before a cycle's end the next one must be thought of."""
-        return LEAST_LEAD_S + 2 * self._line.statistics.round_trip_s + 1.5 * self._thinking_s
+        return PILOT.least_lead_s + 2 * self._line.statistics.round_trip_s + 1.5 * self._thinking_s
 
     def _wait_for_cycle(self, cycles: int) -> float:
         """Wait until the ordered cycle begins; return when it did."""
@@ -194,34 +184,34 @@ class PilotedPlant:
             status = self._line.status
             if status is not None and status.cycles > cycles and not status.has_pending:
                 return self._line.time_of(status.time - status.tick)
-            if self._clock.now() - begun_s > 5.0:  # longer than any cycle and any settling
+            if self._clock.now() - begun_s > PILOT.begin_s:
                 self._stop("the controller does not begin the cycle that it accepted", may_go_on=False)
             self._wait()
 
     def _wait(self) -> None:
         """Let a little time pass; take in what comes; stop when there is nothing to go by."""
-        self._clock.sleep(POLL_S)
+        self._clock.sleep(PILOT.poll_s)
         try:
             self._line.poll()
         except OSError as error:  # the adapter was pulled out
             raise PlantStopped(f"the valve line is gone: {error}", may_go_on=False) from error
         self._camera.poll()
-        if self._clock.now() - self._camera.last_arrived_s > POSE_LOST_S:
+        if self._clock.now() - self._camera.last_arrived_s > PILOT.pose_lost_s:
             # Venting at once lets the body roll on and straighten, 0.3 m from full speed. The cycle is played
             # to its end instead, the model knows where that is, and the driver brakes where there is room.
-            self.lost = f"no pose for {POSE_LOST_S:g} s; halted and vented"
+            self.lost = f"no pose for {PILOT.pose_lost_s:g} s; halted and vented"
 
     def _look(self) -> None:
         """Take over what the camera has seen."""
         new = self._camera.take()
         self._log.seen(new)
-        self._seen = [s for s in self._seen if s.time_s > self._clock.now() - REMEMBERED_S] + new
+        self._seen = [s for s in self._seen if s.time_s > self._clock.now() - PILOT.remembered_s] + new
 
     def _watch(self, motion: Trajectory, begin_s: float) -> None:
         """Stop where the robot strays, or where what is left of the cycle would touch a wall."""
         self._look()
         correction = correct(motion, begin_s, self._seen, self.latency, self._chain)
-        if correction.seen < 3 or self.lost:
+        if correction.seen < PILOT.least_sightings or self.lost:
             return
         left = motion.time_s > self._clock.now() - begin_s
         corrected = correction.apply(motion)
@@ -230,11 +220,11 @@ class PilotedPlant:
         self.body, self.clearance_m = lines[0], float(clearances(self._problem, lines)[0])
         self._shows(self)
         off_m = float(np.hypot(*(corrected.pose - motion.pose)[-1, :2]))
-        if off_m > STRAY * self.robot.length_m:
+        if off_m > PILOT.stray * self.robot.length_m:
             self._stop(f"strayed by {1e3 * off_m:.0f} mm from the predicted motion", may_go_on=True)
         if left.any():
             lines = points_in_room(centre_lines(self.run, motion.kappa[left]), corrected.pose[left])
-            if float(clearances(self._problem, lines).min()) < CONTACT * self.robot.length_m:
+            if float(clearances(self._problem, lines).min()) < PILOT.contact * self.robot.length_m:
                 self._stop("a wall would have been touched within the cycle", may_go_on=True)
 
     def _coast(self, timeline: Timeline, motion: Trajectory | None) -> Trajectory:
@@ -261,21 +251,21 @@ class PilotedPlant:
     def _rest(self) -> Array:
         """Wait until the controller is vented and the robot stands still; return its state."""
         begun_s = look_s = self._clock.now()
-        while self._clock.now() - begun_s < LONGEST_COAST_S:
+        while self._clock.now() - begun_s < PILOT.longest_coast_s:
             self._wait()
-            if self._clock.now() < look_s + LOOK_S:
+            if self._clock.now() < look_s + PILOT.check_s:
                 continue
             look_s = self._clock.now()
             self._look()
             status = self._line.status
-            last = self._straight(self._clock.now() - REST_S)
-            most_m = 4 * REST * self.robot.length_m
+            last = self._straight(self._clock.now() - PILOT.rest_s)
+            most_m = PILOT.rest * self.robot.length_m
             still = len(last) > 3 and float(np.ptp(last[:, :2], axis=0).max()) < most_m
             if (
                 status is not None
                 and status.state == 0
                 and (still or self.lost)
-                and self._clock.now() - begun_s > REST_S
+                and self._clock.now() - begun_s > PILOT.rest_s
             ):
                 break
         return self.state if self.lost else self._resting_state()
@@ -284,12 +274,14 @@ class PilotedPlant:
         """Return the state of rest where the camera sees the robot: the median of its last looks."""
         begun_s = self._clock.now()
         while len(self._seen) < 5:
-            self._clock.sleep(POLL_S)
+            self._clock.sleep(PILOT.poll_s)
             self._camera.poll()
             self._look()
-            if self._clock.now() - begun_s > 2.0:
-                raise NoAnswerError("no pose received within 2 s; check the camera's stream and --pose")
-        x, y, heading = np.median(self._straight(self._seen[-1].time_s - REST_S), axis=0)
+            if self._clock.now() - begun_s > PILOT.first_pose_s:
+                raise NoAnswerError(
+                    f"no pose received within {PILOT.first_pose_s:g} s; check the camera's stream and --pose"
+                )
+        x, y, heading = np.median(self._straight(self._seen[-1].time_s - PILOT.rest_s), axis=0)
         return self._problem.as_planned(self.run.rest(float(x), float(y), float(heading)))
 
     def _straight(self, after_s: float) -> Array:

@@ -15,10 +15,10 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from planners.pilot.settings import OBSERVER
 from srs_opt.errors import InputError
 
 Array = NDArray[np.float64]
-REMEMBERED_STAMPS = 3000  # half a minute at 100 Hz: long against jitter, short against the drift of clocks
 LARGEST_M = 1e3  # a coordinate beyond this is no place in a laboratory
 
 
@@ -124,7 +124,7 @@ class Camera:
 
     def __init__(self, source: PoseSource) -> None:
         self.source = source
-        self._offsets: deque[float] = deque(maxlen=REMEMBERED_STAMPS)
+        self._offsets: deque[float] = deque(maxlen=OBSERVER.clock_stamps)
         self._waiting: list[Report] = []
         self.last_arrived_s = -math.inf
 

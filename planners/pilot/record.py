@@ -10,14 +10,13 @@ import numpy as np
 
 from planners.pilot.observer import straight_pose
 from planners.pilot.pose import Sighting
+from planners.pilot.settings import OBSERVER
 from srs_opt.errors import NoAnswerError
 from srs_opt.measurement.chain import chain_of
 from srs_opt.measurement.dataset import write_dataset as save
 from srs_opt.measurement.records import CENTRE_OF_MASS, TAIL_TO_HEAD, Applied, Bench, DataSet, Trial
 from srs_opt.robot import Robot
 from srs_opt.simulate.timeline import Timeline
-
-MARKER_SD_M = 0.001  # written into the set until its noise is measured
 
 
 @dataclass
@@ -109,4 +108,7 @@ def write_dataset(log: DriveLog, folder: Path, robot: Robot, latency_s: float) -
     )
     rate = (len(time_s) - 1) / float(time_s[-1])
     order = TAIL_TO_HEAD if markers else CENTRE_OF_MASS
-    return save(DataSet("drive", robot, rate, MARKER_SD_M, order, (trial,), (), Bench(), folder), folder)
+    return save(
+        DataSet("drive", robot, rate, OBSERVER.recorded_marker_m, order, (trial,), (), Bench(), folder),
+        folder,
+    )

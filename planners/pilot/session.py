@@ -15,15 +15,13 @@ from planners.pilot.plant import PilotedPlant
 from planners.pilot.pose import Camera, PoseSource
 from planners.pilot.protocol import Fault
 from planners.pilot.record import DriveLog
+from planners.pilot.settings import PILOT
 from planners.pilot.valve_line import Clock, LineStatistics, Port, ValveLine
 from planners.plan.answer import Plan
 from planners.search.problem import Problem
 from srs_opt.controller.program import Program
 from srs_opt.errors import InputError, NoAnswerError
 from srs_opt.model.state import HEADING, X, Y
-
-LONGEST_DECISION_S = 0.1  # that the first cycle is prepared for; later ones by what was seen
-AT_START, AT_START_RAD = 0.127, 0.15  # body lengths, rad; farther from the maze's start, and nothing is begun
 
 
 @dataclass(frozen=True)
@@ -114,7 +112,7 @@ def pilot(
         raise NoAnswerError(f"the drive already fails in simulation: {rehearsal.reason}")
     log = DriveLog()
     plant = PilotedPlant(problem, program, line, Camera(source), clock, log, tell, watch)
-    plant.expect_decisions(min(decision_s, LONGEST_DECISION_S))
+    plant.expect_decisions(min(decision_s, PILOT.longest_decision_s))
     _check_start(problem, plant.state)
     tell("driving")
     try:
@@ -131,7 +129,7 @@ def _check_start(problem: Problem, state: np.ndarray) -> None:
     start = problem.start
     off_m = float(np.hypot(state[X] - start.x, state[Y] - start.y))
     off_rad = abs(float(state[HEADING]) - start.heading)
-    if off_m > AT_START * problem.robot.length_m or off_rad > AT_START_RAD:
+    if off_m > PILOT.at_start * problem.robot.length_m or off_rad > PILOT.at_start_rad:
         raise InputError(
             f"the robot lies at ({state[X]:.3f}, {state[Y]:.3f}), heading {state[HEADING]:.2f}; the start is "
             f"({start.x:.3f}, {start.y:.3f}), {start.heading:.2f}: move it there, or plan from its position: "

@@ -9,13 +9,8 @@ from typing import Protocol
 
 from planners.pilot import protocol
 from planners.pilot.protocol import Command, Fault, Hello, State, Status
+from planners.pilot.settings import VALVE_LINE
 from srs_opt.errors import NoAnswerError
-
-# Until a command is sent again. A frame takes 3 ms at 115,200 baud; the rest is for adapters and radios that
-# hold bytes back. Shorter repeats needlessly, longer loses time in a cycle of half a second.
-ANSWER_S = 0.08
-MOST_TRIES = 5  # in all less than the controller's timeout of 0.5 s
-KEEP_ALIVE_S = 0.1  # a fifth of the controller's timeout
 
 
 class Port(Protocol):
@@ -123,7 +118,7 @@ class ValveLine:
     def poll(self) -> None:
         """Take in what has come; say a word to the controller when it is due."""
         self._take()
-        if self._clock.now() - self._last_sent_s > KEEP_ALIVE_S:
+        if self._clock.now() - self._last_sent_s > VALVE_LINE.keep_alive_s:
             self._send(Command.QUERY, b"", self._next_seq())
 
     def time_of(self, ticks: int) -> float:
@@ -141,11 +136,11 @@ class ValveLine:
     def _ask(self, kind: Command, payload: bytes) -> Hello | Status:
         """Send a command until it is answered."""
         seq = self._next_seq()
-        for attempt in range(MOST_TRIES):
+        for attempt in range(VALVE_LINE.most_tries):
             sent_s = self._send(kind, payload, seq)
             self._commands += attempt == 0
             self._repeats += attempt > 0
-            while self._clock.now() - sent_s < ANSWER_S:
+            while self._clock.now() - sent_s < VALVE_LINE.answer_s:
                 for message in self._take():
                     wanted = Hello if kind is Command.PING else Status
                     if message.seq == seq and isinstance(message, wanted):
@@ -153,7 +148,7 @@ class ValveLine:
                         return message
                 self._clock.sleep(0.001)
         raise NoAnswerError(
-            f"the valve controller does not answer ({kind.name.lower()} sent {MOST_TRIES} times, "
+            f"the valve controller does not answer ({kind.name.lower()} sent {VALVE_LINE.most_tries} times, "
             f"{self._receiver.bad_frames} damaged frames received); check port, baud rate and power"
         )
 

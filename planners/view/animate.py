@@ -13,16 +13,14 @@ from planners.plan.answer import Plan
 from planners.search.problem import Problem
 from planners.view.animation_path import check_animation_path
 from planners.view.picture import gait_colors
+from planners.view.settings import VIEW
 from srs_opt.figures import plain_names
 from srs_opt.files import atomic_path
 
 if TYPE_CHECKING:
     from planners.drive.execute import Execution
 
-FRAMES_PER_S = 20
-MAX_FRAMES = 600
 LONG_SIDE_INCHES = 7.0
-HOLD_S = 1.5  # that the last picture stays
 
 
 def save_animation(path: Path, problem: Problem, plan: Plan, execution: Execution | None = None) -> Path:
@@ -39,7 +37,7 @@ def save_animation(path: Path, problem: Problem, plan: Plan, execution: Executio
 
     check_animation_path(path)
     time, pose, lines, gait = _motion(plan, problem, execution)
-    frames = min(MAX_FRAMES, max(2, int(time[-1] * FRAMES_PER_S)))
+    frames = min(VIEW.most_frames, max(2, int(time[-1] * VIEW.frames_per_s)))
     index = np.searchsorted(time, np.linspace(0, time[-1], frames)).clip(0, len(time) - 1)
     ratio = problem.maze.height_m / problem.maze.width_m
     size = (LONG_SIDE_INCHES, LONG_SIDE_INCHES * ratio) if ratio < 1 else (LONG_SIDE_INCHES / ratio, 7.0)
@@ -66,12 +64,12 @@ def save_animation(path: Path, problem: Problem, plan: Plan, execution: Executio
         return body, trail, head, title
 
     rate = frames / max(time[-1], 1e-3)
-    held = [*range(frames), *[frames - 1] * round(HOLD_S * rate)]  # at the end, before it begins anew
+    held = [*range(frames), *[frames - 1] * round(VIEW.hold_s * rate)]  # at the end, before it begins anew
     plain_names(figure)
     draw(0)
     figure.draw_without_rendering()
     figure.set_layout_engine("none")  # laid out once: half of what every frame would take
-    animation = FuncAnimation(figure, draw, frames=held, interval=1000 / FRAMES_PER_S)
+    animation = FuncAnimation(figure, draw, frames=held, interval=1000 / VIEW.frames_per_s)
     movie = path.suffix.lower() == ".mp4"
     with atomic_path(path) as temporary:
         animation.save(str(temporary), writer=(FFMpegWriter if movie else _gif_writer())(fps=max(rate, 1)))

@@ -14,6 +14,7 @@ from planners.maze.draw import draw_maze
 from planners.plan.answer import Plan
 from planners.plan.certify import clearances
 from planners.search.problem import Problem
+from planners.view.settings import VIEW
 from srs_opt.figures import PAGE_IN, RIGHT, SEQUENTIAL, styled
 
 if TYPE_CHECKING:
@@ -22,9 +23,6 @@ if TYPE_CHECKING:
 
     from planners.drive.execute import Execution
 
-BODY_STEP_S = 0.04  # between the bodies whose union is the swept region
-SHOWN_CLEARANCE_M = 0.1
-LEAST_LABELLED = 0.4  # body lengths of way with one gait: numbers nearer to each other would overlap
 PATH, DRIVEN = "#202020", RIGHT
 
 
@@ -103,7 +101,7 @@ def draw_swept(axes: Axes, problem: Problem, plan: Plan) -> dict[int, Any]:
         ]
         label = None if gait in labelled else f"{number[gait]}  {problem.gaits.gaits[gait].name}"
         labelled.add(gait)
-        _number(axes, c.pose[inside, :2], number[gait], LEAST_LABELLED * problem.robot.length_m)
+        _number(axes, c.pose[inside, :2], number[gait], VIEW.least_labelled * problem.robot.length_m)
         axes.add_patch(
             PathPatch(
                 Outline.make_compound_path(*rings),
@@ -121,7 +119,7 @@ def draw_clearance(axes: Axes, problem: Problem, plan: Plan, colors: dict[int, A
     """Draw the body's clearance over time, coloured by gait, with the margin."""
     c = plan.certificate
     # the certificate stops at a lower bound where that is enough: it would draw steps that are none
-    room = 1e3 * clearances(problem, c.lines, SHOWN_CLEARANCE_M).clip(max=SHOWN_CLEARANCE_M)
+    room = 1e3 * clearances(problem, c.lines, VIEW.shown_clearance_m).clip(max=VIEW.shown_clearance_m)
     first = 0
     for gait, run in groupby(problem.motion.rows(plan.gaits)):
         count = len(list(run))
@@ -136,7 +134,7 @@ def draw_clearance(axes: Axes, problem: Problem, plan: Plan, colors: dict[int, A
 
 
 def _draw_driven_clearance(axes: Axes, problem: Problem, driven: Execution) -> None:
-    room = 1e3 * clearances(problem, driven.lines, SHOWN_CLEARANCE_M).clip(max=SHOWN_CLEARANCE_M)
+    room = 1e3 * clearances(problem, driven.lines, VIEW.shown_clearance_m).clip(max=VIEW.shown_clearance_m)
     axes.plot(driven.time_s, room, "--", color=DRIVEN, linewidth=1)
     axes.set_title("clearance of the body, cut off at 100 mm; dashed: driven, dotted: margin", fontsize=8)
 
@@ -155,10 +153,10 @@ def _number(axes: Axes, way: NDArray[Any], number: int, least_m: float) -> None:
 
 
 def _thinned(time_s: NDArray[Any], instants: NDArray[Any]) -> NDArray[Any]:
-    """Return instants about BODY_STEP_S apart."""
+    """Return instants about `VIEW.body_step_s` apart."""
     if not instants.size:
         return instants
-    wanted = np.arange(time_s[instants[0]], time_s[instants[-1]] + BODY_STEP_S, BODY_STEP_S)
+    wanted = np.arange(time_s[instants[0]], time_s[instants[-1]] + VIEW.body_step_s, VIEW.body_step_s)
     near = np.searchsorted(time_s[instants], wanted).clip(0, instants.size - 1)
     chosen: NDArray[Any] = instants[np.unique(near)]
     return chosen

@@ -18,6 +18,7 @@ from planners.maze.maze import Maze
 from planners.plan.answer import Plan
 from planners.plan.certify import clearances
 from planners.search.problem import Problem
+from planners.view.settings import VIEW
 from srs_opt.files import write_text
 
 if TYPE_CHECKING:
@@ -27,9 +28,6 @@ if TYPE_CHECKING:
 
 VERSION = 2
 WALL_GREY, UNKNOWN_GREY = 0x3A, 0xB4
-FRAME_S = 1 / 30
-MOST_FRAMES = 6000
-SHOWN_CLEARANCE_M = 0.1
 Array = NDArray[np.float64]
 
 
@@ -117,7 +115,7 @@ def _run(
 
     Cycles are (gait before, gait, start in s).
     """
-    count = min(MOST_FRAMES, max(2, math.ceil(float(time_s[-1]) / FRAME_S) + 1))
+    count = min(VIEW.most_recorded_frames, max(2, math.ceil(float(time_s[-1]) / VIEW.recorded_frame_s) + 1))
     instants = np.linspace(0.0, float(time_s[-1]), count)
     after = np.searchsorted(time_s, instants).clip(1, len(time_s) - 1)
     before = after - 1
@@ -125,7 +123,7 @@ def _run(
     share = np.divide(instants - time_s[before], step, out=np.zeros(count), where=step > 0).clip(0, 1)
     body = lines[before] + share[:, None, None] * (lines[after] - lines[before])
     centre = pose[before] + share[:, None] * (pose[after] - pose[before])
-    room = clearances(problem, body, SHOWN_CLEARANCE_M).clip(max=SHOWN_CLEARANCE_M)
+    room = clearances(problem, body, VIEW.shown_clearance_m).clip(max=VIEW.shown_clearance_m)
     return {
         "name": name,
         "duration_s": round(float(time_s[-1]), 5),

@@ -14,6 +14,7 @@ import numpy as np
 import shapely
 
 from srs_opt.drive.calibration import NO_CALIBRATION, DriveCalibration
+from srs_opt.drive.settings import DRIVE_MAP
 from srs_opt.errors import InputError, OutOfReachError
 from srs_opt.gait import Gait, Wave
 from srs_opt.gait_map.grid import GaitMap
@@ -23,10 +24,6 @@ from srs_opt.robot import Robot
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-LEVER_M = 0.1  # weighs turn rates against speeds when distances between motions are taken
-MOST_M_S, MOST_RAD_S = 100.0, 1000.0  # far beyond any snake; geometry with 1e308 overflows
-_REFINEMENTS = 3
 
 
 @dataclass(frozen=True, repr=False)
@@ -136,10 +133,10 @@ class Drive(Result):
         OutOfReachError
             Outside the reachable set; the message names the nearest reachable motion.
         """
-        if not (abs(speed_m_s) <= MOST_M_S and abs(turn_rate_rad_s) <= MOST_RAD_S):
+        if not (abs(speed_m_s) <= DRIVE_MAP.most_m_s and abs(turn_rate_rad_s) <= DRIVE_MAP.most_rad_s):
             raise InputError(
-                f"expected a speed of at most {MOST_M_S:g} m/s and a turn rate of at most {MOST_RAD_S:g} "
-                f"rad/s, found {speed_m_s:g} m/s turning {turn_rate_rad_s:+g} rad/s"
+                f"expected a speed of at most {DRIVE_MAP.most_m_s:g} m/s and a turn rate of at most "
+                f"{DRIVE_MAP.most_rad_s:g} rad/s, found {speed_m_s:g} m/s turning {turn_rate_rad_s:+g} rad/s"
             )
         reverse = speed_m_s < 0
         speed, turn = abs(speed_m_s), turn_rate_rad_s * (-1 if reverse else 1)
@@ -152,18 +149,19 @@ class Drive(Result):
         sign = -1 if reverse else 1
         target = np.array([speed_m_s, turn_rate_rad_s])
         best = self.motion(wave, reverse=reverse)
-        slope = _slopes(corners)
-        for _ in range(_REFINEMENTS):
+        jacobian = _jacobian(corners)
+        slow_m_s = DRIVE_MAP.slow * self.robot.length_m
+        for _ in range(DRIVE_MAP.refinements):
             missing = (target - [best.speed_m_s, best.turn_rate_rad_s]) * [sign, sign * side]
-            if np.hypot(missing[0], LEVER_M * missing[1]) < 1e-3 * max(speed, 0.02):
+            if self._size(missing) < DRIVE_MAP.tolerance * max(speed, slow_m_s):
                 break
-            step = slope @ missing
+            step = jacobian @ missing
             uniform = np.array(
                 [best.wave.frequency_hz, best.wave.pressure_kpa, abs(best.wave.offset[0]), _lag(best.wave)]
             )
             limits = corners[:, :4].min(axis=0), corners[:, :4].max(axis=0)
             following = self.motion(self._wave(np.clip(uniform + step, *limits), side), reverse=reverse)
-            if _distance(following, target) >= _distance(best, target):
+            if self._distance(following, target) >= self._distance(best, target):
                 break
             best = following
         return best
@@ -175,14 +173,25 @@ class Drive(Result):
         return self.gait_for(speed_m_s, 0.0 if np.isinf(radius_m) else speed_m_s / radius_m)
 
     def nearest_reachable(self, speed_m_s: float, turn_rate_rad_s: float) -> tuple[float, float]:
-        """Return the reachable motion nearest to a wanted one (turn rates weighed with 0.1 m)."""
-        sign = -1.0 if speed_m_s < 0 else 1.0
-        scaled = shapely.affinity.scale(self.reachable(), 1, LEVER_M, origin=(0, 0))
-        wanted = shapely.Point(abs(speed_m_s), sign * turn_rate_rad_s * LEVER_M)
+        """Return the reachable motion nearest to a wanted one; turn rates count by `DRIVE_MAP.lever`."""
+        sign, lever_m = -1.0 if speed_m_s < 0 else 1.0, self._lever_m
+        scaled = shapely.affinity.scale(self.reachable(), 1, lever_m, origin=(0, 0))
+        wanted = shapely.Point(abs(speed_m_s), sign * turn_rate_rad_s * lever_m)
         nearest = scaled.boundary.interpolate(scaled.boundary.project(wanted))
         if scaled.contains(wanted):
             nearest = wanted
-        return sign * nearest.x, sign * nearest.y / LEVER_M
+        return sign * nearest.x, sign * nearest.y / lever_m
+
+    @property
+    def _lever_m(self) -> float:
+        return DRIVE_MAP.lever * self.robot.length_m
+
+    def _size(self, motion: np.ndarray) -> float:
+        """Return how large a difference of (speed, turn rate) is, m/s."""
+        return float(np.hypot(motion[0], self._lever_m * motion[1]))
+
+    def _distance(self, gait: DriveGait, target: np.ndarray) -> float:
+        return self._size(np.array([gait.speed_m_s, gait.turn_rate_rad_s]) - target)
 
     def _wave(self, parameters: np.ndarray, side: float) -> Wave:
         frequency, pressure, offset, lag = (float(v) for v in parameters)
@@ -214,15 +223,11 @@ def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
 
 
-def _distance(gait: DriveGait, target: np.ndarray) -> float:
-    return float(np.hypot(gait.speed_m_s - target[0], LEVER_M * (gait.turn_rate_rad_s - target[1])))
-
-
 def _lag(wave: Wave) -> float:
     return wave.phase_rad[1] - wave.phase_rad[0]
 
 
-def _slopes(corners: np.ndarray) -> np.ndarray:
+def _jacobian(corners: np.ndarray) -> np.ndarray:
     """Return d(parameters)/d(motion) on a triangle, (4, 2)."""
     motion = (corners[1:, 4:6] - corners[0, 4:6]).T
     parameters = (corners[1:, :4] - corners[0, :4]).T
