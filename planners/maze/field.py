@@ -123,7 +123,7 @@ class DistanceField:
         ):
             edge = np.maximum(inward, 0.0).astype(np.float32).reshape(shape)
             np.minimum(values, edge, out=values)
-        # distance has a gradient of 1, so interpolation errs by the way to the far nodes at most; float32 rounds
+        # a distance's gradient is 1: interpolation errs by the way to the far nodes at most; float32 rounds
         rounding = 1e-6 * max(1.0, maze.width_m, maze.height_m)
         return cls(values, origin, spacing, maze.bounds, node_error + _HALF_DIAGONAL * spacing + rounding)
 

@@ -26,6 +26,7 @@ from srs_opt.geometry import rotate_back
 from srs_opt.measurement.chain import Chain, link_positions, position_jacobian
 from srs_opt.model.state import FORWARD, POSE, SIDEWAYS
 from srs_opt.simulate.integrate import Trajectory
+from srs_opt.simulate.interpolate import linear_with_rate
 
 Array = NDArray[np.float64]
 
@@ -159,7 +160,4 @@ def _rows(
 def _interpolated(motion: Trajectory, at: Array) -> tuple[Array, Array]:
     """Return configurations (pose, curvatures) and their rates within the motion, linear between nodes."""
     whole = np.concatenate([motion.pose, motion.kappa], axis=1)
-    after = np.searchsorted(motion.time_s, at).clip(1, motion.time_s.size - 1)
-    step = motion.time_s[after] - motion.time_s[after - 1]
-    rate = (whole[after] - whole[after - 1]) / step[:, None]
-    return whole[after - 1] + rate * (at - motion.time_s[after - 1])[:, None], rate
+    return linear_with_rate(motion.time_s, whole, at)

@@ -20,6 +20,7 @@ from planners.plan.certify import clearances
 from planners.search.problem import Problem
 from planners.view.settings import VIEW
 from srs_opt.files import write_text
+from srs_opt.simulate.interpolate import linear
 
 if TYPE_CHECKING:
     from planners.drive.execute import Execution
@@ -117,12 +118,7 @@ def _run(
     """
     count = min(VIEW.most_recorded_frames, max(2, math.ceil(float(time_s[-1]) / VIEW.recorded_frame_s) + 1))
     instants = np.linspace(0.0, float(time_s[-1]), count)
-    after = np.searchsorted(time_s, instants).clip(1, len(time_s) - 1)
-    before = after - 1
-    step = time_s[after] - time_s[before]
-    share = np.divide(instants - time_s[before], step, out=np.zeros(count), where=step > 0).clip(0, 1)
-    body = lines[before] + share[:, None, None] * (lines[after] - lines[before])
-    centre = pose[before] + share[:, None] * (pose[after] - pose[before])
+    body, centre = linear(time_s, lines, instants), linear(time_s, pose, instants)
     room = clearances(problem, body, VIEW.shown_clearance_m).clip(max=VIEW.shown_clearance_m)
     return {
         "name": name,

@@ -69,7 +69,7 @@ def steered(gait: Gait, miss: Callable[[Gait], float], tolerance: float, most: f
 
 
 def _bisected(at: Callable[[float], float], a: float, b: float, tolerance: float) -> float:
-    """Return a root between a and b (regula falsi with halving, so that rugged functions are fine)."""
+    """Return a root between a and b (regula falsi with halving, so that the function need not be smooth)."""
     for k in range(DUTY_BIAS.most_bisections):
         fa, fb = at(a), at(b)
         c = (a + b) / 2 if k % 3 == 2 or fa == fb else a - fa * (b - a) / (fb - fa)

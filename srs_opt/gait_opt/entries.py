@@ -92,7 +92,7 @@ def _certificate(work: _Work, entry: TableGait) -> tuple[TableGait | None, str]:
         if claimed is None:
             return None, "collocation does not find its motion"
         if entry.radius_m is not None and abs(entry.radius_m) < work.robot.body_width_m / 2:
-            # it turns on the spot: whether its path runs ahead or back depends on hairs
+            # it turns on the spot: whether its path runs ahead or back is decided by rounding
             claimed = tuple(math.copysign(speed, entry.speed_m_s) for speed in claimed)
         certificate, (orbit,) = certify(problem, entry.gait, claimed)
     except NoAnswerError as error:

@@ -12,7 +12,7 @@ from srs_opt.robot import Robot
 
 
 def replayed(robot: Robot, table: GaitTable, model: str | None = None, *, jobs: int = 1) -> GaitTable:
-    """Return the gaits of `table` as `robot` runs them from rest; what is unstable or creeps is left out.
+    """Return the gaits of `table` as `robot` runs them from rest, without the unstable and the very slow.
 
     Raises
     ------

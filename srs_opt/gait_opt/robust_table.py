@@ -2,7 +2,7 @@
 
 Optimizing every entry for all robots takes hours (a robust gait takes minutes). Here entries are chosen,
 not optimized: those of the rigid robot's table and the robust gait with its turning companions, simulated on
-every robot. What is unstable, creeps or turns to another side on one of them is left out.
+every robot. What is unstable, hardly moves or turns to another side on one of them is left out.
 """
 
 from __future__ import annotations

@@ -114,13 +114,13 @@ class Actuator:
             return ActuatorState(*held(self.target(valve), state.kappa, state.dkappa, time, tau1, tau2))
         x = state.vector()
 
-        def slope(v: ca.SX) -> ca.SX:
+        def rate(v: ca.SX) -> ca.SX:
             return self.rates(self.unstack(v), valve).vector()
 
-        k1 = slope(x)
-        k2 = slope(x + time / 2 * k1)
-        k3 = slope(x + time / 2 * k2)
-        k4 = slope(x + time * k3)
+        k1 = rate(x)
+        k2 = rate(x + time / 2 * k1)
+        k3 = rate(x + time / 2 * k2)
+        k4 = rate(x + time * k3)
         return self.unstack(x + time / 6 * (k1 + 2 * k2 + 2 * k3 + k4))
 
 

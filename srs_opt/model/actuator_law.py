@@ -120,7 +120,7 @@ class SwitchTrain:
         ramp = age - 0.5
         return ca.vertcat(ramp, ramp + sum(w * e for w, _, e in self._modes(age)))
 
-    def slope(self, age: ca.SX) -> ca.SX:
+    def derivative(self, age: ca.SX) -> ca.SX:
         """Return the curvature's derivative by age, between switches."""
         return 1 - sum(w * e / r for w, r, e in self._modes(age))
 
@@ -179,11 +179,11 @@ def periodic_curvature(
         since = at - switch
         if turns is not None:
             age = since - turns[index]
-            value, slope = train.value(age), train.slope(age)
+            value, derivative = train.value(age), train.derivative(age)
         else:
             assert half_width is not None
             value = _second_difference(train.twice_integrated, since, half_width)
-            slope = _second_difference(train.once_integrated, since, half_width)
-        shape, rate = shape - sign * value, rate - sign * slope
+            derivative = _second_difference(train.once_integrated, since, half_width)
+        shape, rate = shape - sign * value, rate - sign * derivative
     span = target_high - target_low
     return target_low + span * shape[1], span * rate / period, 2 * shape[0] - 1

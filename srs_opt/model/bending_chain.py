@@ -84,9 +84,9 @@ class BendingChain:
         q = self._moment(y, dy, drive) * h
         g = [-model.inertia[i] * ddy[2 + i] for i in range(n)]
         for k, segment in enumerate(m.segments):
-            length, slope = segment.chord[:2]
+            length, length_by_turn = segment.chord[:2]
             along, across = segment.own(*joint[k + 1])
-            stretch, turn = slope * along, length / 2 * across
+            stretch, turn = length_by_turn * along, length / 2 * across
             g[k] += turn - stretch - q[k]
             g[k + 1] += turn + stretch + q[k]
         return ca.vertcat(*joint[0], *g), h * f.friction_power

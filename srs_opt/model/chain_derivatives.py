@@ -86,27 +86,27 @@ def derivatives(chain: BendingChain, y: ca.SX, dy: ca.SX, ddy: ca.SX, drive: Dri
         If an effect makes the force on one link depend on another link's motion.
     """
     motion = chain.motion(y, dy, ddy, ca.SX(1), drive)
-    slopes = _force_slopes(chain, motion, y, drive)
+    force = _force_derivatives(chain, motion, y, drive)
     moves, moves1, moves2 = _moves(chain, motion.segments, dy, ddy)
-    loads = [_mass(chain), _Loads.of(slopes.by_velocity), _Loads.of(slopes.by_place)]
+    loads = [_mass(chain), _Loads.of(force.by_velocity), _Loads.of(force.by_place)]
     assembly = _Assembly(moves, loads)
     mass = chain.model.mass
-    net = [slopes.force[0] - mass * motion.acceleration[0], slopes.force[1] - mass * motion.acceleration[1]]
+    net = [force.value[0] - mass * motion.acceleration[0], force.value[1] - mass * motion.acceleration[1]]
     spring, damper = (_springs(chain, stiffness) for stiffness in chain.turning_stiffness(drive))
     turning = _turning_levers(motion.segments, chain.joint_forces(*net))
-    power_v = _Loads.of(slopes.power_by_velocity)
-    power_r = _Loads.of(slopes.power_by_place)
+    power_v = _Loads.of(force.power_by_velocity)
+    power_r = _Loads.of(force.power_by_place)
     return Derivatives(
         mass=assembly.matrix({MASS: (moves, 1.0)}, _inertia(chain)),
         by_rate=assembly.matrix({MASS: (moves1, -2.0), VELOCITY: (moves, 1.0)}, damper),
         by_place=assembly.matrix(
             {MASS: (moves2, -1.0), VELOCITY: (moves1, 1.0), PLACE: (moves, 1.0)},
             spring.plus(turning),
-            slopes.by_heading,
+            force.by_heading,
         ),
         power_by_rate=ca.horzcat(*[power_v.all(move) for move in moves]),
         power_by_place=ca.horzcat(*[power_v.all(m1) + power_r.all(m) for m1, m in zip(moves1, moves)])
-        + ca.horzcat(0, 0, slopes.power_by_heading),
+        + ca.horzcat(0, 0, force.power_by_heading),
     )
 
 
@@ -199,8 +199,8 @@ def lever(segment: Segment, turn1: ca.SX, lean1: ca.SX, turn2: ca.SX, lean2: ca.
     b_n2 = (c2 * turn1**2 + c1 * turn2 + grown.acceleration) / 2
     found: list[list[ca.SX]] = [[], [], []]
     for sign in (-1, 1):
-        b_e, b_e1 = sign * c1, sign * (c2 * turn1 + grown.slope_rate)
-        b_e2 = sign * (c3 * turn1**2 + c2 * turn2 + grown.slope_acceleration)
+        b_e, b_e1 = sign * c1, sign * (c2 * turn1 + grown.derivative_rate)
+        b_e2 = sign * (c3 * turn1**2 + c2 * turn2 + grown.derivative_acceleration)
         # components in axes that turn with lean1
         d_e, d_n = b_e1 - b_n * lean1, b_n1 + b_e * lean1
         dd_e = b_e2 - b_n1 * lean1 - b_n * lean2 - d_n * lean1
@@ -244,7 +244,7 @@ def _turning_levers(segments: Sequence[Segment], joint: Sequence[Pair]) -> _Loca
 
 
 @dataclass(frozen=True)
-class _Slopes:
+class _ForceDerivatives:
     """Derivatives of each link's force (2, 2) or (2, 1) and of the friction power by its motion; forces."""
 
     by_velocity: list[ca.SX]
@@ -253,37 +253,39 @@ class _Slopes:
     power_by_velocity: list[ca.SX]
     power_by_place: list[ca.SX]
     power_by_heading: ca.SX
-    force: Pair
+    value: Pair
 
 
-def _force_slopes(chain: BendingChain, m: Motion, y: ca.SX, drive: Drive) -> _Slopes:
+def _force_derivatives(chain: BendingChain, m: Motion, y: ca.SX, drive: Drive) -> _ForceDerivatives:
     n, theta = chain.links, y[2:]
     r, v, th = ca.SX.sym("r", 2 * n), ca.SX.sym("v", 2 * n), ca.SX.sym("theta", n)
     frame, p = ca.SX.sym("frame", 4), chain.model.parameters.vector
-    # what friction makes of a bend is left out of the slopes: it is small beside the bending stiffness, and
-    # only the steps' matrix asks for them, not the motion
-    bend = ca.SX.sym("bend", n - 1)
-    f = chain.forces((r[:n], r[n:]), (v[:n], v[n:]), ca.cos(th), ca.sin(th), frame, bend)
+    # how friction depends on the curvature is left out: it is small beside the bending stiffness, and only
+    # the steps' matrix asks for these derivatives, not the motion
+    kappa = ca.SX.sym("kappa", n - 1)
+    f = chain.forces((r[:n], r[n:]), (v[:n], v[n:]), ca.cos(th), ca.sin(th), frame, kappa)
     jacobians = [ca.jacobian(ca.vertcat(f.x, f.y), of) for of in (v, r, th)]
     jacobians += [ca.jacobian(f.friction_power, of) for of in (v, r, th)]
     _check_local(jacobians[:3], n)
-    slopes = ca.Function("slopes", [r, v, th, frame, bend, p], [*jacobians, f.x, f.y], {"cse": True})
+    function = ca.Function(
+        "force_derivatives", [r, v, th, frame, kappa, p], [*jacobians, f.x, f.y], {"cse": True}
+    )
     place, velocity = ca.vertcat(*m.place), ca.vertcat(*m.velocity)
-    f_v, f_r, f_th, p_v, p_r, p_th, f_x, f_y = slopes(
+    f_v, f_r, f_th, p_v, p_r, p_th, f_x, f_y = function(
         place, velocity, theta, drive.where_and_when, chain.chambers(drive).kappa(y), p
     )
 
     def block(matrix: ca.SX, i: int) -> ca.SX:
         return matrix[[i, n + i], [i, n + i]]
 
-    return _Slopes(
+    return _ForceDerivatives(
         by_velocity=[block(f_v, i) for i in range(n)],
         by_place=[block(f_r, i) for i in range(n)],
         by_heading=[f_th[[i, n + i], i] for i in range(n)],
         power_by_velocity=[p_v[0, [i, n + i]] for i in range(n)],
         power_by_place=[p_r[0, [i, n + i]] for i in range(n)],
         power_by_heading=p_th,
-        force=(f_x, f_y),
+        value=(f_x, f_y),
     )
 
 

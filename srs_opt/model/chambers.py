@@ -36,12 +36,12 @@ class Drive:
 
 @dataclass(frozen=True)
 class Growth:
-    """What chambers' lengthening adds to rate and acceleration of a chord and of its slope by the turn."""
+    """What chambers' lengthening adds to rate and acceleration of a chord and its derivative by the turn."""
 
     rate: ca.SX
     acceleration: ca.SX
-    slope_rate: ca.SX
-    slope_acceleration: ca.SX
+    derivative_rate: ca.SX
+    derivative_acceleration: ca.SX
 
 
 NO_GROWTH = Growth(*[ca.SX(1, 1)] * 4)

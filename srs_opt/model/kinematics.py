@@ -20,7 +20,7 @@ _SERIES_RADIUS = 0.3  # below it the Taylor series of sinc is exact to rounding
 
 # Taylor coefficients in h^2 of sin(h)/h and of its derivative over h
 _SINC = tuple((-1) ** k / math.factorial(2 * k + 1) for k in range(7))
-_SLOPE = tuple((-1) ** k * 2 * k / math.factorial(2 * k + 1) for k in range(1, 8))
+_FIRST = tuple((-1) ** k * 2 * k / math.factorial(2 * k + 1) for k in range(1, 8))
 # of (sin(h)/h)'' in h^2, and of (sin(h)/h)''' over h
 _SECOND = tuple((-1) ** k * 2 * k * (2 * k - 1) / math.factorial(2 * k + 1) for k in range(1, 8))
 _THIRD = tuple((-1) ** k * 2 * k * (2 * k - 1) * (2 * k - 2) / math.factorial(2 * k + 1) for k in range(2, 9))
@@ -82,12 +82,12 @@ def arc(length: ca.SX, curvature: ca.SX, heading: ca.SX) -> tuple[ca.SX, ca.SX, 
     return chord * ca.cos(middle), chord * ca.sin(middle), heading + turn
 
 
-def _sinc_and_slope(h: ca.SX, cos: ca.SX, sin: ca.SX) -> tuple[ca.SX, ca.SX]:
+def _sinc_and_derivative(h: ca.SX, cos: ca.SX, sin: ca.SX) -> tuple[ca.SX, ca.SX]:
     """Return sin(h)/h and its derivative, smooth through zero, given cos(h) and sin(h)."""
     small = ca.fabs(h) < _SERIES_RADIUS
     inverse = 1 / ca.if_else(small, 1.0, h)
     value = ca.if_else(small, _polynomial(_SINC, h * h), sin * inverse)
-    return value, ca.if_else(small, h * _polynomial(_SLOPE, h * h), (cos - value) * inverse)
+    return value, ca.if_else(small, h * _polynomial(_FIRST, h * h), (cos - value) * inverse)
 
 
 def segment_chord(
@@ -99,21 +99,21 @@ def segment_chord(
     """
     h = segment_length * kappa / 2
     cos, sin = ca.cos(h), ca.sin(h)
-    arc_chord, arc_slope = _sinc_and_slope(h, cos, sin)
-    bend, gap_chord, gap_slope = gap_length * gap_ratio / 4, ca.SX(1), ca.SX(0)
+    arc_chord, arc_derivative = _sinc_and_derivative(h, cos, sin)
+    bend, gap_chord, gap_derivative = gap_length * gap_ratio / 4, ca.SX(1), ca.SX(0)
     if not ca.SX(gap_ratio).is_zero():
         gap_cos, gap_sin = ca.cos(bend * kappa), ca.sin(bend * kappa)
-        gap_chord, gap_slope = _sinc_and_slope(bend * kappa, gap_cos, gap_sin)
+        gap_chord, gap_derivative = _sinc_and_derivative(bend * kappa, gap_cos, gap_sin)
         middle_cos, middle_sin = turn_by(gap_cos, gap_sin, cos, sin)
         cos, sin = turn_by(gap_cos, gap_sin, middle_cos, middle_sin)
     else:
         middle_cos, middle_sin = cos, sin
     half = segment_length / 2
     chord = segment_length * arc_chord + gap_length * gap_chord * middle_cos
-    slope = segment_length * half * arc_slope + gap_length * (
-        bend * gap_slope * middle_cos - (half + bend) * gap_chord * middle_sin
+    derivative = segment_length * half * arc_derivative + gap_length * (
+        bend * gap_derivative * middle_cos - (half + bend) * gap_chord * middle_sin
     )
-    return chord, slope, cos, sin
+    return chord, derivative, cos, sin
 
 
 def segment_sagitta(
@@ -151,14 +151,16 @@ def straight_gap_chord(
     half = segment_length / 2
     h = half * kappa
     cos, sin = ca.cos(h), ca.sin(h)
-    value, slope = _sinc_and_slope(h, cos, sin)
+    value, derivative = _sinc_and_derivative(h, cos, sin)
     small = ca.fabs(h) < _SERIES_RADIUS
     inverse, z = 1 / ca.if_else(small, 1.0, h), h * h
-    second = ca.if_else(small, _polynomial(_SECOND, z), -value - 2 * slope * inverse)
-    third = ca.if_else(small, h * _polynomial(_THIRD, z), -slope + 2 * (slope * inverse - second) * inverse)
+    second = ca.if_else(small, _polynomial(_SECOND, z), -value - 2 * derivative * inverse)
+    third = ca.if_else(
+        small, h * _polynomial(_THIRD, z), -derivative + 2 * (derivative * inverse - second) * inverse
+    )
     jet = (
         segment_length * value + gap_length * cos,
-        half * (segment_length * slope - gap_length * sin),
+        half * (segment_length * derivative - gap_length * sin),
         half**2 * (segment_length * second - gap_length * cos),
         half**3 * (segment_length * third + gap_length * sin),
     )
@@ -201,11 +203,11 @@ def body_frame_chain(
     x, y, x_rate, y_rate = ([ca.SX(0)] for _ in range(4))
     cosines, sines = [c], [s]
     for i in range(kappa.shape[0]):
-        chord, slope, c_half, s_half = segment_chord(kappa[i], length[i], gap_length, gap_ratio)
+        chord, derivative, c_half, s_half = segment_chord(kappa[i], length[i], gap_length, gap_ratio)
         # two half turns by complex products: no further cosine along the chain
         c, s = turn_by(c_half, s_half, c, s)
         middle_rate = (angle_rate[i] + angle_rate[i + 1]) / 2
-        along, across = slope * dkappa[i], chord * middle_rate
+        along, across = derivative * dkappa[i], chord * middle_rate
         if not growth[i].is_zero():
             along += growth[i] * chord_by_length(kappa[i], length[i], gap_length, gap_ratio)
         x.append(x[-1] + chord * c)

@@ -175,9 +175,9 @@ class Mechanics(ABC):
         p, n = self.parameters, self.links
         normal = self.normal_force()
         c, s = cos, sin
-        bend = _at_links(kappa)
+        curvature = _at_links(kappa)
         skews = [effect.wheel_angle(e, n) for effect, e in p.effects if effect.wheel_angle]
-        skews += [effect.steering(e, bend) for effect, e in p.effects if effect.steering]
+        skews += [effect.steering(e, curvature) for effect, e in p.effects if effect.steering]
         if skews:
             skew = sum(skews[1:], skews[0])
             c, s = turn_by(ca.cos(skew), ca.sin(skew), cos, sin)
@@ -201,7 +201,7 @@ class Mechanics(ABC):
             sin=sin,
             along=v_t,
             across=v_n,
-            curvature=bend,
+            curvature=curvature,
             time_s=frame[1],
         )
         for effect, e in p.effects:

@@ -26,9 +26,9 @@ def centre_line_function(structure: Structure, samples: int) -> ca.Function:
     x, y, heading = ca.SX(0), ca.SX(0), mechanics.chain.angle[0]
     xs, ys = [x], [y]
     for i in range(structure.segments):
-        half_gap, bend = mechanics.gap_length / 2, mechanics.gap_ratio * kappa[i]
+        half_gap = (mechanics.gap_length / 2, mechanics.gap_ratio * kappa[i])
         part = mechanics.length[i] / POINTS_PER_ARC
-        for length, curvature in [(half_gap, bend), *[(part, kappa[i])] * POINTS_PER_ARC, (half_gap, bend)]:
+        for length, curvature in [half_gap, *[(part, kappa[i])] * POINTS_PER_ARC, half_gap]:
             dx, dy, heading = arc(length, curvature, heading)
             x, y = x + dx, y + dy
             xs.append(x)

@@ -65,8 +65,8 @@ def compliant_step(structure: Structure) -> ca.Function:
     shape_error = ca.SX(0)
     if not actuator.linear:
         half = actuator.advance(actuator.advance(act, valve, h / 2), valve, h / 2)
-        bend = parameters["segment_length_m"] * (half.dkappa - end.dkappa)
-        shape_error, end = ca.sumsqr(LEVER_M * bend), half
+        turn_rate_error = parameters["segment_length_m"] * (half.dkappa - end.dkappa)
+        shape_error, end = ca.sumsqr(LEVER_M * turn_rate_error), half
     moved, velocity, kappa, dkappa = to_body(y, dy, end.kappa, end.dkappa, p)
     step = ca.vertcat(*turn_by(ca.cos(x[HEADING]), ca.sin(x[HEADING]), moved[0], moved[1]), moved[2])
     pose = x[POSE] + step
@@ -102,11 +102,11 @@ def _stages(
     start = drive(act)
     force, power = chain.residual(y, dy, zero, start, ca.SX(1))
     acceleration = mass_matrix(chain, y, start).solver()(force)
-    slopes = derivatives(chain, y, dy, acceleration, start)
+    jacobian = derivatives(chain, y, dy, acceleration, start)
     in_time, power_in_time = chain.rate_in_time(y, dy, acceleration, start, actuator.jerk(act, valve))
     acceleration = h * acceleration
     step = h * GAMMA
-    solve = slopes.mass.plus(slopes.by_rate, -step).plus(slopes.by_place, -(step**2)).solver()
+    solve = jacobian.mass.plus(jacobian.by_rate, -step).plus(jacobian.by_place, -(step**2)).solver()
     k: list[_Increment] = []
     last: tuple[float, ...] = (*STAGES[4], 1.0)
     for i in range(6):
@@ -122,14 +122,16 @@ def _stages(
         r_place = h * (dy + at.velocity) + coupled.place
         r_velocity = acceleration + at.acceleration + coupled.velocity
         right = residual + h * h * TIME_WEIGHTS[i] * in_time
-        right += slopes.mass.times(r_velocity) + step * slopes.by_place.times(r_place)
+        right += jacobian.mass.times(r_velocity) + step * jacobian.by_place.times(r_place)
         velocity = solve(GAMMA * right)
         place = GAMMA * (r_place + h * velocity)
-        work = power + coupled.work + h * (slopes.power_by_rate @ velocity + slopes.power_by_place @ place)
+        work = (
+            power + coupled.work + h * (jacobian.power_by_rate @ velocity + jacobian.power_by_place @ place)
+        )
         work += h * h * TIME_WEIGHTS[i] * power_in_time
         k.append(_Increment(place, velocity, velocity / GAMMA - r_velocity, GAMMA * work))
     error = k[5].velocity
-    squared = error.T @ slopes.mass.times(error) / chain.model.total_mass()
+    squared = error.T @ jacobian.mass.times(error) / chain.model.total_mass()
     return [_scaled(w, i) for w, i in zip((*last, 1.0), k)], squared, shapes[1.0]
 
 

@@ -98,8 +98,8 @@ def largest(values: np.ndarray) -> float:
     cycle = values[:, :-1]
     row, k, count = np.arange(len(cycle)), cycle.argmax(axis=1), cycle.shape[1]
     before, peak, after = (cycle[row, (k + d) % count] for d in (-1, 0, 1))
-    bend = 2 * peak - before - after
-    rise = np.divide((after - before) ** 2, 8 * bend, out=np.zeros(len(cycle)), where=bend > 0)
+    second = 2 * peak - before - after
+    rise = np.divide((after - before) ** 2, 8 * second, out=np.zeros(len(cycle)), where=second > 0)
     return float((peak + rise).max())
 
 

@@ -18,6 +18,13 @@ def linear(time_s: np.ndarray, value: np.ndarray, at: np.ndarray) -> np.ndarray:
     return np.asarray((1 - share) * value[k] + share * value[k + 1])
 
 
+def linear_with_rate(time_s: np.ndarray, value: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return what `linear` returns, and its derivative by time."""
+    k, _ = _interval(time_s, at, value.ndim)
+    step = (time_s[k + 1] - time_s[k]).reshape(-1, *[1] * (value.ndim - 1))
+    return linear(time_s, value, at), np.asarray((value[k + 1] - value[k]) / step)
+
+
 def hermite(time_s: np.ndarray, value: np.ndarray, rate: np.ndarray, at: np.ndarray) -> np.ndarray:
     """Do what `linear` does, cubically, with the rates (n, ...) at the nodes: of fourth order."""
     k, u = _interval(time_s, at, value.ndim)

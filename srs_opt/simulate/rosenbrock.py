@@ -40,8 +40,8 @@ class _BodyField:
         moving = ca.vertcat(m.kappa, m.dkappa, m.time)
         in_time = ca.jtimes(body, moving, ca.vertcat(m.dkappa, ddkappa, 1))
         self.value = ca.Function("body", [pose, velocity, *shape, m.time, p], [body])
-        self.slopes = ca.Function(
-            "slopes",
+        self.jacobians = ca.Function(
+            "jacobians",
             [pose, velocity, *shape, m.time, ddkappa, p],
             [ca.jacobian(body, pose), ca.jacobian(body, velocity), in_time],
         )
@@ -95,7 +95,7 @@ def step_function(structure: Structure) -> ca.Function:
     shapes = _stage_shapes(actuator, act, valve, h)
     p = parameters.vector
     rates = actuator.rates(act, valve)
-    by_pose, by_velocity, in_time = field.slopes(
+    by_pose, by_velocity, in_time = field.jacobians(
         body[POSE], body[VELOCITY], act.kappa, act.dkappa, act.time_s, rates.dkappa, p
     )
     solve = _StageSolver(by_pose, by_velocity, h)
@@ -116,8 +116,8 @@ def step_function(structure: Structure) -> ca.Function:
     shape_error = ca.SX(0)
     if not actuator.linear:  # no closed form: two half steps are kept, one whole step tells their error
         half = actuator.advance(actuator.advance(act, valve, h / 2), valve, h / 2)
-        bend = parameters["segment_length_m"] * (half.dkappa - last.dkappa)
-        shape_error, last = ca.sumsqr(LEVER_M * bend), half
+        turn_rate_error = parameters["segment_length_m"] * (half.dkappa - last.dkappa)
+        shape_error, last = ca.sumsqr(LEVER_M * turn_rate_error), half
     spin_error = LEVER_M * k[5][5] / inertia
     error = ca.sqrt(k[5][3] ** 2 + k[5][4] ** 2 + spin_error**2 + shape_error + 1e-30)
     return ca.Function(
