@@ -6,9 +6,13 @@ import numpy as np
 
 
 def _interval(time_s: np.ndarray, at: np.ndarray, dimensions: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the node before each instant and the share of the way to the next, shaped for broadcasting."""
+    """Return the node before each instant and the share of the way to the next, shaped for broadcasting.
+
+    Of nodes at one time, as where motions were joined, the last counts.
+    """
     k = np.clip(np.searchsorted(time_s, at, side="right") - 1, 0, time_s.size - 2)
-    share = np.clip((at - time_s[k]) / (time_s[k + 1] - time_s[k]), 0.0, 1.0)
+    step = time_s[k + 1] - time_s[k]
+    share = np.divide(at - time_s[k], step, out=np.ones(k.shape), where=step > 0).clip(0.0, 1.0)
     return k, share.reshape(-1, *[1] * (dimensions - 1))
 
 
