@@ -13,8 +13,8 @@ class DistanceSettings:
     Attributes
     ----------
     finest_m : float
-        Spacing of the table where nothing else is wanted. Half takes four times the memory; the error, which
-        sends points to the exact distance, goes with it.
+        Spacing of the table where nothing else is wanted. Half takes four times the memory; the error,
+        which sends points to the exact distance, goes with it.
     nodes : int
         To which the table grows without a wanted spacing, or to one node per cell of an occupancy grid.
     most_nodes : int
@@ -47,7 +47,8 @@ class MapFileSettings:
     Attributes
     ----------
     world_margin_m : float
-        About the obstacles of a Gazebo world, which has no bounds: the BARN benchmark drives to goals beyond.
+        About the obstacles of a Gazebo world, which has no bounds: the BARN benchmark drives to goals
+        beyond.
     upright_rad : float
         Tilt up to which an obstacle's outline on the floor is taken as if it stood upright.
     lossy_levels : int

@@ -27,9 +27,11 @@ class PilotSettings:
     remembered_s : float
         Of sightings: longer than any cycle.
     stray : float
-        Distance from the predicted motion at which the robot vents: it was lifted, pushed, or does not move.
+        Distance from the predicted motion at which the robot vents: it was lifted, pushed, or does not
+        move.
     contact : float
-        Foreseen clearance at which it is better to vent than to go on. Below zero, since the prediction errs.
+        Foreseen clearance at which it is better to vent than to go on. Below zero, since the prediction
+        errs.
     rest_s, rest : float
         Places of so long within so much: the robot stands still.
     longest_coast_s : float
@@ -85,8 +87,8 @@ class ObserverSettings:
     longest_latency_s : float
         Bound on its estimate.
     clock_stamps : int
-        Stamps from which the sender's clock is estimated: half a minute at 100 Hz, long against jitter, short
-        against the drift of clocks.
+        Stamps from which the sender's clock is estimated: half a minute at 100 Hz, long against jitter,
+        short against the drift of clocks.
     recorded_marker_m : float
         Written into the data set of a drive until its noise is measured.
     """
@@ -109,8 +111,9 @@ class ValveLineSettings:
     Attributes
     ----------
     answer_s : float
-        Until a command is sent again. A frame takes 3 ms at 115,200 baud; the rest is for adapters and radios
-        that hold bytes back. Shorter repeats needlessly, longer loses time in a cycle of half a second.
+        Until a command is sent again. A frame takes 3 ms at 115,200 baud; the rest is for adapters and
+        radios that hold bytes back. Shorter repeats needlessly, longer loses time in a cycle of half a
+        second.
     most_tries : int
         In all less than the controller's timeout of 0.5 s.
     keep_alive_s : float

@@ -21,7 +21,7 @@ from srs_opt.gait_opt.prices import Price, prices
 from srs_opt.gait_opt.score import Score, score
 from srs_opt.gait_opt.search_settings import SWITCH_TIMES
 from srs_opt.orbit.steady import Orbit
-from srs_opt.simulate.cycle_motion import STRAIGHT_RADIUS_M
+from srs_opt.simulate.settings import MOTION
 
 # the start is near: let the barrier begin low and push nothing off its limits
 _IPOPT = {
@@ -132,7 +132,7 @@ def _path_speeds(
     speeds = []
     for r in range(len(problem.robots)):
         speed, turn = (float(z[p.layout.unknown(r, name)]) for name in _MOTION)
-        if abs(turn) * STRAIGHT_RADIUS_M > abs(speed):
+        if abs(turn) * MOTION.straight_radius_m > abs(speed):
             states = z[p.layout.states(r)].reshape(p.layout.points, -1) * scales[r]
             ahead, aside = states[:, AHEAD], states[:, ASIDE]
             distance = float(weights @ np.hypot(ahead, aside - speed / turn))

@@ -11,9 +11,8 @@ from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait
 from srs_opt.model.parameters import Structure
 from srs_opt.model.registry import build
+from srs_opt.orbit.settings import DIFFERENCE
 from srs_opt.simulate.integrate import Integrator
-
-_HAIR = 1e-6  # of central differences: errs by about 1e-10 from rounding and less from curvature
 
 
 def periodic_actuators(run: Integrator, gait: Gait, p: np.ndarray) -> np.ndarray:
@@ -65,7 +64,7 @@ def actuator_multiplier(run: Integrator, gait: Gait, act: np.ndarray, p: np.ndar
         return float(np.exp(-gait.period_s / max(run.robot.tau1_s, run.robot.tau2_s)))
     durations, valves = gait.phases()
     hold = _hold_function(run.structure)
-    steps = _HAIR * (1 + np.abs(act))
+    steps = DIFFERENCE.actuator * (1 + np.abs(act))
     ends = act[:, None] + np.hstack([np.diag(steps), -np.diag(steps)])
     for h, valve, k in zip(durations, valves.T, _fine(durations)):
         for _ in range(k):

@@ -11,14 +11,11 @@ import numpy as np
 from srs_opt.errors import NoAnswerError
 from srs_opt.orbit.actuators import periodic_actuators
 from srs_opt.orbit.body import integrator
+from srs_opt.orbit.settings import ATTRACTOR
 from srs_opt.orbit.solve import Cycle, reached_from
 from srs_opt.orbit.steady import Orbit, orbit_of
 from srs_opt.robot import Robot
 from srs_opt.simulate.batched import run_batched
-
-# forward speeds of the starts over body lengths per period; no snake of this kind reaches one
-STARTS = (-0.5, 0.25, 0.5, 0.75, 1.0)
-SAME_M_S = 2e-3  # orbits whose dynamic states differ by less are one (Newton closes them to 1e-9)
 
 
 def other_orbits(robot: Robot, orbit: Orbit, model: str | None = None) -> list[Orbit]:
@@ -40,12 +37,13 @@ def other_orbits(robot: Robot, orbit: Orbit, model: str | None = None) -> list[O
     cycle = Cycle.of(run, gait)
     bends = periodic_actuators(run, gait, cycle.p)[: 2 * robot.segments]
     pace = robot.segments * robot.pitch_m / gait.period_s
-    starts = [np.concatenate([[share * pace, 0.0, 0.0], bends]) for share in STARTS]
+    starts = [np.concatenate([[share * pace, 0.0, 0.0], bends]) for share in ATTRACTOR.starts]
+    same_m_s = ATTRACTOR.same * robot.length_m
     found: list[Orbit] = []
     for solution in run_batched([reached_from(run, gait, start) for start in starts]):
         if isinstance(solution, NoAnswerError):
             continue
         other = orbit_of(run, gait, solution)
-        if all(cycle.size(other.dynamic - known.dynamic) > SAME_M_S for known in (orbit, *found)):
+        if all(cycle.size(other.dynamic - known.dynamic) > same_m_s for known in (orbit, *found)):
             found.append(other)
     return sorted(found, key=lambda o: -o.speed_m_s)

@@ -7,12 +7,11 @@ from functools import lru_cache
 import numpy as np
 
 from srs_opt.geometry import rotate
+from srs_opt.orbit.settings import ENVELOPE
 from srs_opt.robot import Robot
 from srs_opt.simulate.integrate import Integrator
 from srs_opt.simulate.interpolate import linear
 from srs_opt.simulate.shapes import centre_lines
-
-SAMPLES = 96  # body shapes per cycle for the envelope: it errs by less than 0.1 mm, with half of them by 1 mm
 
 
 @lru_cache(maxsize=64)
@@ -26,10 +25,13 @@ def body_over_cycle(
     time_s: np.ndarray,
     pose: np.ndarray,
     kappa: np.ndarray,
-    samples: int = SAMPLES,
+    samples: int | None = None,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return times (samples,), poses (samples, 3) and centre lines x, y (points, samples) in the room."""
-    at = np.linspace(0.0, time_s[-1], samples)
+    """Return times (samples,), poses (samples, 3) and centre lines x, y (points, samples) in the room.
+
+    Without a number of samples, `ENVELOPE.samples`.
+    """
+    at = np.linspace(0.0, time_s[-1], samples or ENVELOPE.samples)
     poses, kappas = linear(time_s, pose, at), linear(time_s, kappa, at)
     x, y = centre_lines(run, kappas).T
     room_x, room_y = rotate(poses[:, 2], x, y)

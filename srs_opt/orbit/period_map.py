@@ -14,13 +14,12 @@ import numpy as np
 
 from srs_opt.model.parameters import Structure
 from srs_opt.model.registry import build, state_layout
+from srs_opt.orbit.settings import DIFFERENCE
 from srs_opt.simulate.batched import Search, StepRequest
 from srs_opt.simulate.integrate import Integrator, step_kernel
 from srs_opt.simulate.kernel import LANES, Course, Kernel
 from srs_opt.simulate.mesh import Mesh
 from srs_opt.simulate.rosenbrock import VELOCITY, step_function
-
-HAIR_M_S = 1e-8  # far below any smoothing speed of friction; rounding costs 1e-8 of a derivative
 
 
 @dataclass(frozen=True)
@@ -53,7 +52,7 @@ def period_map(
     """
     dynamic = run.layout.dynamic
     if run.structure.compliant:
-        return _varied(run, x, mesh, valve, p, HAIR_M_S / scale)
+        return _varied(run, x, mesh, valve, p, DIFFERENCE.velocity_m_s / scale)
     kernel = monodromy_kernel(run.structure)
     got = yield StepRequest(kernel, np.concatenate([x, np.eye(3).ravel()]), mesh, valve, p)
     monodromy = got.states[run.states :, -1].reshape(3, 3, order="F")
@@ -72,7 +71,7 @@ def plain_period_map(
 
 
 def _varied(
-    run: Integrator, x: np.ndarray, mesh: Mesh, valve: np.ndarray, p: np.ndarray, hair: np.ndarray
+    run: Integrator, x: np.ndarray, mesh: Mesh, valve: np.ndarray, p: np.ndarray, steps: np.ndarray
 ) -> PeriodMap:
     """Return the period map, its derivative by finite differences of the start.
 
@@ -81,7 +80,7 @@ def _varied(
     """
     dynamic, kernel = run.layout.dynamic, step_kernel(run.structure)
     starts = np.tile(x, (len(dynamic) + 1, 1))
-    starts[1 + np.arange(len(dynamic)), dynamic] += hair
+    starts[1 + np.arange(len(dynamic)), dynamic] += steps
     held, ends = valve.T[mesh.phase], []
     for k in range(0, len(starts), LANES):
         courses = [Course(start, mesh.h_s, held, p) for start in starts[k : k + LANES]]
@@ -90,7 +89,7 @@ def _varied(
         if k == 0:
             path, error = states[:, :, 0].T, errors[:, 0]
     last = np.concatenate(ends)[:, dynamic]
-    return PeriodMap(path, error, last[0], ((last[1:] - last[0]) / hair[:, None]).T)
+    return PeriodMap(path, error, last[0], ((last[1:] - last[0]) / steps[:, None]).T)
 
 
 def monodromy_step(structure: Structure) -> ca.Function:

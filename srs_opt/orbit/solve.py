@@ -120,12 +120,14 @@ class PeriodicSolution:
 
 
 def search_orbit(
-    run: Integrator, gait: Gait, tolerance: float = INTEGRATION.tolerance_m_s, guess: np.ndarray | None = None
+    run: Integrator, gait: Gait, tolerance: float | None = None, guess: np.ndarray | None = None
 ) -> Search[PeriodicSolution]:
     """Search the periodic orbit of `gait`.
 
     Parameters
     ----------
+    tolerance : float, optional
+        By default that of `INTEGRATION`.
     guess : array (d,), optional
         Dynamic states at time 0 to start from (continuation). Without it two periods are simulated from rest;
         in the compliant model the gait is played from rest until it settles.
@@ -135,6 +137,7 @@ def search_orbit(
     NoAnswerError
         If the motion does not close on itself.
     """
+    tolerance = INTEGRATION.tolerance_m_s if tolerance is None else tolerance
     cycle = Cycle.of(run, gait)
     mesh = Mesh.uniform(cycle.durations_s, ORBIT.first_step_s)
     if run.structure.compliant and guess is None:
@@ -155,7 +158,7 @@ def search_orbit(
 
 
 def reached_from(
-    run: Integrator, gait: Gait, dynamic: np.ndarray, tolerance: float = INTEGRATION.tolerance_m_s
+    run: Integrator, gait: Gait, dynamic: np.ndarray, tolerance: float | None = None
 ) -> Search[PeriodicSolution]:
     """Search the orbit that `gait` leads to from given dynamic states at time 0, actuators on their cycle.
 
@@ -164,6 +167,7 @@ def reached_from(
     NoAnswerError
         If the motion does not settle.
     """
+    tolerance = INTEGRATION.tolerance_m_s if tolerance is None else tolerance
     cycle = Cycle.of(run, gait)
     mesh = Mesh.uniform(cycle.durations_s, ORBIT.first_step_s)
     return (yield from _reached_from(cycle, cycle.start(dynamic), mesh, tolerance))

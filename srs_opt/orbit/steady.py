@@ -15,6 +15,7 @@ from srs_opt.gait import Gait, check_gait
 from srs_opt.model.state import HEADING, POSE
 from srs_opt.orbit.actuators import actuator_multiplier
 from srs_opt.orbit.body import body_over_cycle, integrator
+from srs_opt.orbit.settings import CHAIN
 from srs_opt.orbit.solve import PeriodicSolution, search_orbit
 from srs_opt.parallel import executor
 from srs_opt.parallel.sweep import sweep
@@ -22,13 +23,11 @@ from srs_opt.result import Result
 from srs_opt.robot import Robot
 from srs_opt.simulate.batched import Search, run_batched, run_one
 from srs_opt.simulate.cycle_motion import CycleMotion, cycle_motion
-from srs_opt.simulate.integrate import INTEGRATION, Integrator
+from srs_opt.simulate.integrate import Integrator
 from srs_opt.simulate.rosenbrock import WORK
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-CHAINS, CHAIN = 8, 12  # gaits searched side by side, and one after the other
 
 
 @dataclass(frozen=True, repr=False)
@@ -134,7 +133,7 @@ def steady_gait(
     gait: Gait,
     model: str | None = None,
     *,
-    tolerance: float = INTEGRATION.tolerance_m_s,
+    tolerance: float | None = None,
     guess: np.ndarray | None = None,
 ) -> Orbit:
     """Return the steady state of `gait`.
@@ -143,8 +142,8 @@ def steady_gait(
     ----------
     robot, gait, model
         The gait must drive every segment of the robot.
-    tolerance : float
-        Local error of the integration, m/s per step.
+    tolerance : float, optional
+        Local error of the integration, m/s per step; by default that of `INTEGRATION`.
     guess : array (d,), optional
         Dynamic states at time 0 of a neighbouring gait's orbit. Without it the orbit of a compliant model is
         the one that is reached from rest.
@@ -165,12 +164,12 @@ def steady_gaits(
     gaits: Sequence[Gait],
     model: str | None = None,
     *,
-    tolerance: float = INTEGRATION.tolerance_m_s,
+    tolerance: float | None = None,
     jobs: int = 1,
 ) -> list[Orbit | NoAnswerError]:
     """Return the steady states of many gaits, several at a time in each call of the compiled code.
 
-    Gaits that follow each other in the list should be alike: every hundred or so are cut into ``CHAINS``
+    Gaits that follow each other in the list should be alike: every hundred or so are cut into `CHAIN.chains`
     parts, and in each part a gait's orbit is the guess for the next (not in the compliant model: every gait
     starts from rest). `jobs` processes share the work; the
     results are the same. For a gait without a steady state the error says why.
@@ -184,14 +183,14 @@ def steady_gaits(
         check_gait(robot, gait)
     work = partial(_side_by_side, robot, model, tolerance)
     with executor(jobs) as where:
-        return list(sweep(work, gaits, chunk=CHAINS * CHAIN, where=where))
+        return list(sweep(work, gaits, chunk=CHAIN.chains * CHAIN.length, where=where))
 
 
 def _side_by_side(
-    robot: Robot, model: str | None, tolerance: float, gaits: Sequence[Gait]
+    robot: Robot, model: str | None, tolerance: float | None, gaits: Sequence[Gait]
 ) -> list[Orbit | NoAnswerError]:
     run = integrator(robot, model)
-    parts = np.array_split(np.arange(len(gaits)), min(CHAINS, max(len(gaits), 1)))
+    parts = np.array_split(np.arange(len(gaits)), min(CHAIN.chains, max(len(gaits), 1)))
     chains = [_chain(run, [gaits[i] for i in part], tolerance) for part in parts]
     found: list[Orbit | NoAnswerError] = []
     for chain in run_batched(chains):
@@ -201,7 +200,9 @@ def _side_by_side(
     return found
 
 
-def _chain(run: Integrator, gaits: Sequence[Gait], tolerance: float) -> Search[list[Orbit | NoAnswerError]]:
+def _chain(
+    run: Integrator, gaits: Sequence[Gait], tolerance: float | None
+) -> Search[list[Orbit | NoAnswerError]]:
     found: list[Orbit | NoAnswerError] = []
     guess = None
     for gait in gaits:
@@ -216,7 +217,7 @@ def _chain(run: Integrator, gaits: Sequence[Gait], tolerance: float) -> Search[l
     return found
 
 
-def _search(run: Integrator, gait: Gait, tolerance: float, guess: np.ndarray | None) -> Search[Orbit]:
+def _search(run: Integrator, gait: Gait, tolerance: float | None, guess: np.ndarray | None) -> Search[Orbit]:
     check_gait(run.robot, gait)
     return orbit_of(run, gait, (yield from search_orbit(run, gait, tolerance, guess)))
 

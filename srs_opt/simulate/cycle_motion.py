@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from srs_opt.geometry import centre_of_rotation
-
-STRAIGHT_RADIUS_M = 50.0  # a larger radius is reported as straight
+from srs_opt.simulate.settings import MOTION
 
 
 @dataclass(frozen=True)
@@ -64,7 +63,7 @@ def cycle_motion(
         centre = centre + pose[0, :2]
         distance = np.hypot(pose[:, 0] - centre[0], pose[:, 1] - centre[1])
         radius = float(weights @ distance)
-        if radius <= STRAIGHT_RADIUS_M:
+        if radius <= MOTION.straight_radius_m:
             reach = np.hypot(outline_x - centre[0], outline_y - centre[1])
             outside, inside = largest(reach) - radius + half_width, radius + largest(-reach) + half_width
             forward = _forward(displacement, pose, heading, centre, weights)

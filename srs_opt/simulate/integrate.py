@@ -142,9 +142,7 @@ class Integrator:
         """
         return run_one(self.stepping(x, mesh, valve, p))
 
-    def integrate(
-        self, timeline: Timeline, x: np.ndarray, tolerance: float = INTEGRATION.tolerance_m_s
-    ) -> Trajectory:
+    def integrate(self, timeline: Timeline, x: np.ndarray, tolerance: float | None = None) -> Trajectory:
         """Integrate over a whole timeline from state `x` (the robot's valve delay is applied here).
 
         Raises
@@ -158,7 +156,7 @@ class Integrator:
         self,
         timeline: Timeline,
         x: np.ndarray,
-        tolerance: float = INTEGRATION.tolerance_m_s,
+        tolerance: float | None = None,
         like: Trajectory | None = None,
     ) -> Search[Trajectory]:
         """Do what `integrate` does, as a search: see `run_batched` for many at once.
@@ -166,6 +164,7 @@ class Integrator:
         The errors of a motion `like` this one, of the same duration, tell where steps have to be short from
         the first attempt on; what is asked of them is the same without it.
         """
+        tolerance = INTEGRATION.tolerance_m_s if tolerance is None else tolerance
         timeline = timeline.delayed(valve_delay_s(self.robot))
         times, states, errors = [np.zeros(1)], [x[:, None]], []
         start = 0.0

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from srs_opt.errors import NoAnswerError
+from srs_opt.simulate.settings import STEP
 
 ORDER = 4.0  # of the embedded error estimate's local error, h^4
-# of a motion that still deserves the name; parameters far from any robot's ask for millions, and gigabytes
-MOST_STEPS_PER_S, MOST_STEPS_AT_ALL = 50_000, 20_000
 
 
 @dataclass(frozen=True)
@@ -81,7 +80,7 @@ def _divided(h_s: np.ndarray, phase: np.ndarray, density: np.ndarray, least: int
     totals = np.add.reduceat(density, first)
     counts = np.maximum(np.ceil(totals).astype(int), least)
     span_s = float(h_s.sum())
-    if counts.sum() > max(MOST_STEPS_PER_S * span_s, MOST_STEPS_AT_ALL):
+    if counts.sum() > max(STEP.most_per_s * span_s, STEP.most):
         raise NoAnswerError(
             f"the motion cannot be integrated: {span_s:.3g} s of it would take {counts.sum()} steps; "
             "parameters are far from those of any robot"
@@ -99,12 +98,18 @@ def _divided(h_s: np.ndarray, phase: np.ndarray, density: np.ndarray, least: int
 
 def _density(error: np.ndarray, tolerance: float) -> np.ndarray:
     """Return by how many new steps each old one is to be replaced."""
-    return _smoothed(np.clip((np.maximum(error, 1e-30) / tolerance) ** (1 / ORDER), 0.25, 4.0))
+    return _smoothed(
+        np.clip(
+            (np.maximum(error, 1e-30) / tolerance) ** (1 / ORDER),
+            1 / STEP.largest_change,
+            STEP.largest_change,
+        )
+    )
 
 
 def _smoothed(density: np.ndarray) -> np.ndarray:
     """Widen peaks by one step to either side: features move a little when steps change."""
     wide: np.ndarray = density.copy()
-    wide[1:] = np.maximum(wide[1:], 0.7 * density[:-1])
-    wide[:-1] = np.maximum(wide[:-1], 0.7 * density[1:])
+    wide[1:] = np.maximum(wide[1:], STEP.beside * density[:-1])
+    wide[:-1] = np.maximum(wide[:-1], STEP.beside * density[1:])
     return wide

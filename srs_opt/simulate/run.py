@@ -16,6 +16,7 @@ from srs_opt.robot import Robot
 from srs_opt.simulate import compiled
 from srs_opt.simulate.cycle_motion import CycleMotion, cycle_motion
 from srs_opt.simulate.integrate import INTEGRATION, Integrator, Trajectory
+from srs_opt.simulate.settings import MOTION
 from srs_opt.simulate.shapes import centre_lines
 from srs_opt.simulate.timeline import Timeline
 
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
 
 LONGEST_S, MOST_CYCLES = 100_000.0, 1_000_000
 LEAST_CYCLES = 1e-6  # shorter ones drown in rounding
-_CHECKED_CYCLES = 4
 
 
 @dataclass(frozen=True, repr=False)
@@ -160,9 +160,9 @@ def motion_of_cycle(run: Integrator, trajectory: Trajectory, gait: Gait, cycle: 
 
 def _error_estimate(run: Integrator, start: np.ndarray, gait: Gait, duration_s: float) -> float | None:
     """Return the relative change of the path's length when a stretch is integrated again, finer."""
-    stretch = Timeline.of_gait(gait, min(duration_s, _CHECKED_CYCLES * gait.period_s))
+    stretch = Timeline.of_gait(gait, min(duration_s, MOTION.checked_cycles * gait.period_s))
     usual = run.integrate(stretch, start)
-    finer = run.integrate(stretch, start, INTEGRATION.tolerance_m_s / 16)
+    finer = run.integrate(stretch, start, INTEGRATION.tolerance_m_s / MOTION.finer)
     distance = float(np.hypot(*np.diff(finer.pose[:, :2], axis=0).T).sum())
     if distance < 1e-6:
         return None

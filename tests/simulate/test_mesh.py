@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from srs_opt.errors import NoAnswerError
-from srs_opt.simulate.mesh import MOST_STEPS_PER_S, Mesh
+from srs_opt.simulate.mesh import Mesh
+from srs_opt.simulate.settings import STEP
 
 PHASES_S = np.array([0.25, 0.5, 0.25])
 
@@ -43,4 +44,4 @@ def test_a_motion_beyond_any_robot_s_is_refused_before_memory_is_full():
 
     with pytest.raises(NoAnswerError, match="cannot be integrated"):
         refine_on()
-    assert 1000 < mesh.h_s.size <= span_s * MOST_STEPS_PER_S
+    assert 1000 < mesh.h_s.size <= span_s * STEP.most_per_s
