@@ -11,10 +11,7 @@ import numpy as np
 from srs_opt.calibrate.candidates import Candidate
 from srs_opt.calibrate.objective import priors, projected, sum_eliminated
 from srs_opt.discrepancy.screen import Linearisation
-
-# 20 degrees: 0.9 of what one effect does the other can do too. Half leaves out pairs that noisier data would
-# not tell apart; double lists half of all effects.
-ALIKE_RAD = 0.35
+from srs_opt.discrepancy.search_settings import SCREEN
 
 
 @dataclass(frozen=True)
@@ -81,15 +78,19 @@ def _root(matrix: np.ndarray) -> np.ndarray:
 
 
 def alike_pairs(
-    lin: Linearisation, candidates: Sequence[Candidate], most_rad: float = ALIKE_RAD
+    lin: Linearisation, candidates: Sequence[Candidate], most_rad: float | None = None
 ) -> tuple[Pair, ...]:
-    """Return the pairs of effects that the data can hardly tell apart, the nearest first."""
+    """Return the pairs of effects that the data can hardly tell apart, the nearest first.
+
+    Angles are at most `most_rad`, by default `ScreenSettings.alike_rad`.
+    """
+    limit = SCREEN.alike_rad if most_rad is None else most_rad
     angles = Angles(lin)
     best: dict[tuple[str, str], float] = {}
     for a, b in itertools.combinations(candidates, 2):
         if a.effect != b.effect:
             angle = angles.between(a, b)
             pair = (a.effect, b.effect)
-            if angle is not None and angle <= min(most_rad, best.get(pair, np.inf)):
+            if angle is not None and angle <= min(limit, best.get(pair, np.inf)):
                 best[pair] = angle
     return tuple(Pair(pair, angle) for pair, angle in sorted(best.items(), key=lambda item: item[1]))

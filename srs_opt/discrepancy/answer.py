@@ -11,8 +11,8 @@ from srs_opt.calibrate.result import bench_warnings, calibrated_robot
 from srs_opt.discrepancy.diagnostics import needed_gain
 from srs_opt.discrepancy.hypothesis import Hypothesis
 from srs_opt.discrepancy.locate import left_places
-from srs_opt.discrepancy.promising import CONTENDER
 from srs_opt.discrepancy.screen import Score
+from srs_opt.discrepancy.search_settings import SCREEN
 from srs_opt.discrepancy.verdict import DESCRIBED, NO_GAP, ONE_OF
 from srs_opt.robot import Robot
 
@@ -168,7 +168,7 @@ def _fate(found: Discrepancy, score: Score, inflation: float) -> str:
         return "no evidence"
     chosen = selection.best.names if selection else ()
     gains = [s.improvement for s in found.scores if s.candidate.effect in chosen]
-    if gains and score.improvement > CONTENDER * max(gains):
+    if gains and score.improvement > SCREEN.contender_share * max(gains):
         return "not refitted: acts otherwise than what explains more"
     return "well behind in the screen"
 

@@ -23,50 +23,10 @@ from srs_opt.discrepancy.hypothesis import Hypothesis
 from srs_opt.discrepancy.screen import Linearisation, Score, expected_start, screen
 from srs_opt.discrepancy.seal import Gap, open_seal
 from srs_opt.discrepancy.search import Search
+from srs_opt.discrepancy.settings import DESCRIPTION, DescriptionSettings
 from srs_opt.effects import generic_effects
 from srs_opt.effects.generic import TERMS, Term
 from srs_opt.measurement.records import Trial
-
-
-@dataclass(frozen=True)
-class Settings:
-    """What a description must do to be given.
-
-    Attributes
-    ----------
-    closes : float
-        Share of the gap on sealed trials.
-    lead : float
-        Share of what the next best explanation leaves (the best listed effects, or a term that acts on
-        something else or elsewhere) that this one may leave at most.
-    refits : int
-        Terms that are fitted, the best of the screens.
-    exchanges : int
-        Rounds of looking for a better term from where the best one stands.
-    hopeful : float
-        Share of what the best of a screen promises from which on a term can be the better one. Twice as much
-        would leave out terms of which slopes far from the fit say little.
-    bench : float
-        Standard deviations that a calibrated value may lie from its bench value; twice what it may with a
-        named effect, because a term is a simple likeness of what is there.
-    explained : float
-        Share of the misfit that the best may leave and need not be exchanged.
-    told : float
-        Deviance, on all open trials, by which another explanation is told from one that leaves nothing
-        significant, however little it leaves itself: a few times what chance makes of look-alikes.
-    """
-
-    closes: float = 0.75
-    lead: float = 0.5
-    refits: int = 7
-    exchanges: int = 3
-    hopeful: float = 0.1
-    bench: float = 7.0
-    explained: float = 0.02
-    told: float = 20.0
-
-
-DEFAULT = Settings()
 
 
 @dataclass(frozen=True)
@@ -157,7 +117,11 @@ def terms_of(links: int, present: Sequence[str] = ()) -> tuple[Candidate, ...]:
 
 
 def describe(
-    search: Search, null: Fit, listed: Hypothesis, sealed: Sequence[Trial], settings: Settings = DEFAULT
+    search: Search,
+    null: Fit,
+    listed: Hypothesis,
+    sealed: Sequence[Trial],
+    settings: DescriptionSettings = DESCRIPTION,
 ) -> Description | None:
     """Return the best description; None where no term can be fitted.
 
@@ -185,7 +149,7 @@ def describe(
     return Description(found, gap, tuple(tried), why_not)
 
 
-def _fitted(search: Search, null: Fit, settings: Settings) -> list[Hypothesis]:
+def _fitted(search: Search, null: Fit, settings: DescriptionSettings) -> list[Hypothesis]:
     """Return what was fitted to the start of a few trials."""
     brief = Search(search.experiment, search.base, search.candidates, search.quick, search.seed)
     first = search.try_out((), null.point)
@@ -210,7 +174,7 @@ def _fitted(search: Search, null: Fit, settings: Settings) -> list[Hypothesis]:
             attempt(lin, score)
     for _ in range(settings.exchanges):
         leader = min(found.values(), key=_left, default=None)
-        if leader is None or _left(leader) < settings.explained * _left(first):
+        if leader is None or _left(leader) < settings.explained_share * _left(first):
             break
         others = [c for c in _hopeful(screens, settings) if c.label not in found]
         brief.candidates = (*leader.candidates, *others)
@@ -222,20 +186,22 @@ def _fitted(search: Search, null: Fit, settings: Settings) -> list[Hypothesis]:
     return list(found.values())
 
 
-def _hopeful(screens: Sequence[Sequence[tuple[Linearisation, Score]]], settings: Settings) -> list[Candidate]:
+def _hopeful(
+    screens: Sequence[Sequence[tuple[Linearisation, Score]]], settings: DescriptionSettings
+) -> list[Candidate]:
     """Return the terms of which a screen promises a share of what it does of its best."""
     found = {
         score.candidate.label: score.candidate
         for scores in screens
         for _, score in scores
-        if score.improvement >= settings.hopeful * scores[0][1].improvement
+        if score.improvement >= settings.promising_share * scores[0][1].improvement
     }
     return list(found.values())
 
 
-def _contenders(tried: Sequence[Hypothesis], settings: Settings) -> list[Hypothesis]:
+def _contenders(tried: Sequence[Hypothesis], settings: DescriptionSettings) -> list[Hypothesis]:
     """Return what is fitted to all trials: the best, and one more that comes near it."""
-    return [h for h in tried[:2] if _left(tried[0]) > settings.lead * _left(h)]
+    return [h for h in tried[:2] if _left(tried[0]) > settings.rival_share * _left(h)]
 
 
 def _left(hypothesis: Hypothesis) -> float:
@@ -243,9 +209,9 @@ def _left(hypothesis: Hypothesis) -> float:
     return max(hypothesis.fit.misfit_ratio - 1, 1e-3)
 
 
-def _told(found: Hypothesis, other: Hypothesis, settings: Settings) -> bool:
+def _told(found: Hypothesis, other: Hypothesis, settings: DescriptionSettings) -> bool:
     """Whether all open trials tell another explanation from one that leaves them nothing but noise."""
-    return found.fit.variance_inflation == 1 and other.deviance - found.deviance > settings.told
+    return found.fit.variance_inflation == 1 and other.deviance - found.deviance > settings.told_deviance
 
 
 def _doubt(
@@ -256,24 +222,24 @@ def _doubt(
     listed: Hypothesis,
     family: int,
     told: Collection[str],
-    settings: Settings,
+    settings: DescriptionSettings,
 ) -> str:
     """Return why a description is not believed; empty when nothing is against it."""
     if null.deviance - found.deviance < needed_gain(found.candidates[0], family):
         return "it gains no more than the best of as many terms does by chance"
-    lead = 1.0 if listed.candidates and listed.implausible() else settings.lead
+    lead = 1.0 if listed.candidates and listed.implausible() else settings.rival_share
     if _left(found) > lead * _left(listed) and listed.label not in told:
         return "listed effects do about as well"
-    if gap is None or gap.ratio is None or gap.ratio > 1 - settings.closes:
+    if gap is None or gap.ratio is None or gap.ratio > 1 - settings.closed_share:
         closed = 0.0 if gap is None or gap.ratio is None else 1 - gap.ratio
         return f"it closes only {closed:.0%} of the gap on the sealed trials"
     rivals = [h for h in tried if _says(h) != _says(found)]
     own = next(h for h in tried if h.label == found.label)
-    near = [h for h in rivals if _left(own) > settings.lead * _left(h) and h.label not in told]
+    near = [h for h in rivals if _left(own) > settings.rival_share * _left(h) and h.label not in told]
     if near:
         return f"{near[0].label} does about as well"
     name, off = max(found.fit.off_bench.items(), key=lambda item: abs(item[1]), default=("", 0.0))
-    if abs(off) > settings.bench:
+    if abs(off) > settings.most_bench_sd:
         return f"{name} would lie {abs(off):.1f} standard deviations from its bench value"
     return ""
 
@@ -290,4 +256,4 @@ def _says(hypothesis: Hypothesis) -> tuple[str, int | None]:
     return TERMS[candidate.effect].acts, candidate.place
 
 
-__all__ = ["DEFAULT", "Description", "Settings", "describe", "terms_of"]
+__all__ = ["Description", "describe", "terms_of"]

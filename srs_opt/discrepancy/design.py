@@ -10,19 +10,14 @@ import numpy as np
 from srs_opt.calibrate.experiment import Experiment, Point
 from srs_opt.calibrate.instruments import check_expectations
 from srs_opt.calibrate.normal_equations import bounded_solve
+from srs_opt.discrepancy.gap_settings import DESIGN
 from srs_opt.discrepancy.hypothesis import Hypothesis
 from srs_opt.discrepancy.select import Selection
 from srs_opt.errors import NoAnswerError
 from srs_opt.measurement.instruments import INSTRUMENTS
 from srs_opt.measurement.records import Schedule, Trial
 
-LEVEL = 10.0  # deviance that tells two hypotheses apart
-SURE = 0.95  # power from which on an effect's own instrument is asked before further trials
-_SECONDS, _RATE_HZ = 4.0, 60.0
 NOTHING = "no effect"
-_CYCLES = 4  # of a slow gait
-_LEAST_HZ = 1e-3
-_LONG_WAVE = 0.6  # of the set's own phase lag
 
 
 @dataclass(frozen=True)
@@ -80,7 +75,7 @@ def next_experiment(
         for name, tool in tools.items()
     }
     direct = [f"{tools[q].what} ({q})" for q in _own_instruments(first, second)]
-    sure = {what: options[what] for what in direct if power(options[what]) > SURE}
+    sure = {what: options[what] for what in direct if power(options[what]) > DESIGN.sure_power}
     if not sure:  # trials cost a simulation each
         new = proposals(experiment, trials)
         both = [_trial_gains(experiment, a, b, new) for a, b in ((first, second), (second, first))]
@@ -111,7 +106,7 @@ def power(gain: float) -> float:
     """Return the probability that a separation of expected deviance `gain` exceeds the level that decides."""
     from scipy.special import chndtr
 
-    return float(1 - chndtr(LEVEL, 1, max(gain, 1e-9)))
+    return float(1 - chndtr(DESIGN.decisive_deviance, 1, max(gain, 1e-9)))
 
 
 def _instrument_gain(
@@ -145,9 +140,9 @@ def proposals(experiment: Experiment, trials: Sequence[Trial]) -> Mapping[str, T
         end(t.frequency_hz for t in gaits if t.frequency_hz > 0 or t is model) for end in (min, max)
     )
     weak, strong = (end(t.pressure_kpa for t in gaits) for end in (min, max))
-    slow, fast = max(slow, _LEAST_HZ), max(fast, _LEAST_HZ)
-    long_lag = _LONG_WAVE * model.phase_lag_rad
-    duration_s = max(_SECONDS, _CYCLES / slow)
+    slow, fast = max(slow, DESIGN.least_frequency_hz), max(fast, DESIGN.least_frequency_hz)
+    long_lag = DESIGN.long_wave_share * model.phase_lag_rad
+    duration_s = max(DESIGN.duration_s, DESIGN.cycles / slow)
     plain = replace(
         _blank(experiment, model, duration_s),
         duration_s=duration_s,
@@ -188,7 +183,7 @@ def _gait(what: str, frequency_hz: float, pressure_kpa: float) -> str:
 
 def _blank(experiment: Experiment, like: Trial, duration_s: float) -> Trial:
     """Return a trial in which everything is seen, at zero, where `like` sees it."""
-    time_s = np.arange(int(duration_s * _RATE_HZ)) / _RATE_HZ
+    time_s = np.arange(int(duration_s * DESIGN.rate_hz)) / DESIGN.rate_hz
     if like.markers_m is None:
         return replace(like, time_s=time_s, centre_m=np.zeros((time_s.size, 2)))
     seen = experiment.model.links if like.spots is None else len(like.spots)

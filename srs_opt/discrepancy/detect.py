@@ -13,8 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-DRAWS = 4000
-_RANK = 1e-7
+from srs_opt.discrepancy.gap_settings import DETECTION
 
 
 @dataclass(frozen=True)
@@ -121,7 +120,7 @@ def detect(
     z, correlation = score / size, covariance / size[:, None] / size
     values, vectors = np.linalg.eigh(correlation)
     root = vectors * np.sqrt(np.maximum(values, 0))
-    drawn = rng.standard_normal((DRAWS, z.size)) @ root.T
+    drawn = rng.standard_normal((DETECTION.draws, z.size)) @ root.T
     observed, found = [], []
     largest: dict[int, np.ndarray] = {}  # of the drawn values, by the number of degrees of freedom
     for group in groups:
@@ -134,16 +133,20 @@ def detect(
         if dof:
             values = np.square(drawn[:, list(group)] @ whiten).sum(axis=1)
             largest[dof] = np.maximum(largest.get(dof, 0.0), values)
-    smallest = np.min([np.ones(DRAWS), *(chdtrc(dof, values) for dof, values in largest.items())], axis=0)
+    smallest = np.min(
+        [np.ones(DETECTION.draws), *(chdtrc(dof, values) for dof, values in largest.items())], axis=0
+    )
     adjusted = tuple(float((1 + np.sum(smallest <= p)) / (1 + smallest.size)) for p in observed)
     serial_p = float(ndtr(-serial.sum() / np.sqrt(max(serial.size, 1)))) if serial.size else 1.0
-    # the family of groups and the autocorrelation share the level unequally: the latter sees little more
-    whole = min(1.0, min([1.0, *(a / 0.9 for a in adjusted)]), serial_p / 0.1)
+    # Bonferroni, with the level shared unequally: the autocorrelation sees little more than the groups
+    whole = min(
+        1.0, min([1.0, *(a / DETECTION.group_level for a in adjusted)]), serial_p / DETECTION.serial_level
+    )
     return Detection(whole, tuple(found), serial_p, adjusted)
 
 
 def _whiten(correlation: np.ndarray) -> np.ndarray:
     values, vectors = np.linalg.eigh(correlation)
-    keep = values > _RANK * max(values[-1], 1e-300)
+    keep = values > DETECTION.least_eigenvalue * max(values[-1], 1e-300)
     keep &= values > 1e-9
     return np.asarray(vectors[:, keep] / np.sqrt(values[keep]))

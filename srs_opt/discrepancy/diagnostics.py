@@ -8,17 +8,9 @@ from srs_opt.calibrate.candidates import Candidate
 from srs_opt.calibrate.objective import excess_of
 from srs_opt.discrepancy.detect import Detection
 from srs_opt.discrepancy.functions import Group
+from srs_opt.discrepancy.gap_settings import DETECTION, EXPLANATION
 from srs_opt.discrepancy.hypothesis import Hypothesis
 from srs_opt.discrepancy.screen import Linearisation, Score
-
-ADEQUATE = 0.01  # level at which a fitted model is rejected
-# The smoothing of friction is numerical, not physical, and long data sets resolve the difference. What is
-# left of a gap is put down to it while it is this share of the noise's variance and of the gap's, and asks
-# for nothing known at a size that matters: gaits near a change of theirs show a thousandth of a wheel's toe.
-OF_NOISE, OF_GAP = 0.02, 0.01
-TELLING = 0.1  # of an effect's typical size
-PROMISED = 0.5  # share of what is left that an effect must promise to close for a search to go on
-FALSE_NAME = 0.002  # family-wise level for adding an effect
 
 
 @dataclass(frozen=True)
@@ -46,7 +38,7 @@ class Diagnostics:
     @property
     def adequate(self) -> bool:
         """Whether nothing is left beyond noise and scatter."""
-        return self.detection.p_value > ADEQUATE
+        return self.detection.p_value > DETECTION.adequate_level
 
 
 def explained(null: Diagnostics, diagnostics: Diagnostics) -> bool:
@@ -55,13 +47,13 @@ def explained(null: Diagnostics, diagnostics: Diagnostics) -> bool:
         return True
     family = len(diagnostics.scores)
     if any(
-        s.relative_size >= TELLING and s.improvement > needed_gain(s.candidate, family)
+        s.relative_size >= EXPLANATION.telling_size and s.improvement > needed_gain(s.candidate, family)
         for s in diagnostics.scores
     ):
         return False
     left = diagnostics.hypothesis.fit.misfit_ratio - 1
     gap = null.hypothesis.fit.misfit_ratio - 1
-    return left < OF_NOISE and left < OF_GAP * gap
+    return left < EXPLANATION.noise_share and left < EXPLANATION.gap_share * gap
 
 
 def explainable(diagnostics: Diagnostics) -> bool:
@@ -73,7 +65,8 @@ def explainable(diagnostics: Diagnostics) -> bool:
     left = excess_of(fit.equations) / fit.variance_inflation
     family = len(diagnostics.scores)
     return any(
-        s.relative_size >= TELLING and s.improvement > max(PROMISED * left, needed_gain(s.candidate, family))
+        s.relative_size >= EXPLANATION.telling_size
+        and s.improvement > max(EXPLANATION.promised_share * left, needed_gain(s.candidate, family))
         for s in diagnostics.scores
     )
 
@@ -82,4 +75,4 @@ def needed_gain(candidate: Candidate, family: int) -> float:
     """Return the drop of the deviance that the best of `family` candidates reaches by chance once in 500."""
     from scipy.special import chdtri
 
-    return float(chdtri(len(candidate.coordinates), FALSE_NAME / max(family, 1)))
+    return float(chdtri(len(candidate.coordinates), DETECTION.name_level / max(family, 1)))

@@ -20,19 +20,16 @@ from srs_opt.discrepancy.diagnostics import Diagnostics
 from srs_opt.discrepancy.functions import ResidualFunctions
 from srs_opt.discrepancy.hypothesis import Hypothesis
 from srs_opt.discrepancy.screen import Linearisation, screen
+from srs_opt.discrepancy.search_settings import SCREEN
 from srs_opt.discrepancy.split import brief_name
 from srs_opt.measurement.records import Trial
-
-# s of all trials together up to which candidates are screened on every one: half the time for sets of a dozen
-# trials would lose small effects, and beyond it five trials of 8 s show a third of a typical size as plainly
-SCREENED_S = 60.0
 
 
 def screened_of(trials: Sequence[Trial], quick: Sequence[Trial]) -> tuple[Trial, ...]:
     """Return the trials on which candidates are screened: all, or where that takes long those of `quick`."""
     few = {t.name for t in quick}
     chosen = tuple(t for t in trials if brief_name(t.name) in few)
-    long = sum(float(t.time_s[-1] - t.time_s[0]) for t in trials) > SCREENED_S
+    long = sum(float(t.time_s[-1] - t.time_s[0]) for t in trials) > SCREEN.screened_s
     return chosen if long and chosen else tuple(trials)
 
 

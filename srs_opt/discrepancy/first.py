@@ -15,16 +15,9 @@ from srs_opt.calibrate.noise import Noise
 from srs_opt.calibrate.normal_equations import RANK
 from srs_opt.calibrate.objective import priors, projected, sum_eliminated
 from srs_opt.discrepancy.design import NOTHING, NextExperiment
-from srs_opt.discrepancy.diagnostics import FALSE_NAME
+from srs_opt.discrepancy.gap_settings import DETECTION, FIRST
 from srs_opt.errors import NoAnswerError
 from srs_opt.measurement.records import DataSet, Trial
-
-# a set of this many trials, of so many seconds or cycles each, finds three quarters of the effects
-TRIALS, SECONDS, CYCLES, RATE_HZ = 9, 3.0, 3, 60.0
-SPREAD = (0.75, 1.0, 1.25)  # times the middle frequency, where the set has too few gaits of its own
-OFFSETS = (-0.3, 0.0, 0.3)
-WEAKER = (0.8, 0.9, 1.0)  # times the largest pressure
-FALLBACK = (1.0, 48.0)  # Hz, kPa: where the set holds no gait at all
 
 
 def first_experiment(dataset: DataSet, noise: Noise, model: str | None = None) -> NextExperiment | None:
@@ -50,13 +43,13 @@ def first_experiment(dataset: DataSet, noise: Noise, model: str | None = None) -
     total, fitted = sum_eliminated(equations), len(coordinates)
     precision, _ = priors(coordinates, point)
     _, left = projected(total, fitted, precision, RANK)
-    limit = chdtri(1, FALSE_NAME / len(candidates))
+    limit = chdtri(1, DETECTION.name_level / len(candidates))
     powers: dict[str, float] = {}
     for k, candidate in enumerate(candidates):
         gain = candidate.sizes[0].typical ** 2 * float(left[k, k])
         found = float(1 - chndtr(limit, 1, max(gain, 1e-9)))
         powers[candidate.effect] = min(found, powers.get(candidate.effect, 1.0))
-    sure = sum(p > 0.9 for p in powers.values())
+    sure = sum(p > FIRST.shown_power for p in powers.values())
     frequencies = sorted({t.frequency_hz for t in trials})
     pressures = sorted({t.pressure_kpa for t in trials})
     what = (
@@ -71,8 +64,8 @@ def first_experiment(dataset: DataSet, noise: Noise, model: str | None = None) -
 
 def _trials(dataset: DataSet) -> list[Trial]:
     gaits = _gaits(dataset)
-    duration_s = max(SECONDS, CYCLES / min(f for f, *_ in gaits))
-    time_s = np.arange(int(duration_s * RATE_HZ)) / RATE_HZ
+    duration_s = max(FIRST.duration_s, FIRST.cycles / min(f for f, *_ in gaits))
+    time_s = np.arange(int(duration_s * FIRST.rate_hz)) / FIRST.rate_hz
     unseen = np.zeros((time_s.size, dataset.robot.links, 2))
     plain = Trial("", 1.0, 0.0, 0.0, 0.0, 0.0, duration_s, time_s, unseen)
     return [
@@ -93,16 +86,21 @@ def _gaits(dataset: DataSet) -> Sequence[tuple[float, float, float, float]]:
     ]
     own += [(m.frequency_hz, m.pressure_kpa, m.offset, m.phase_lag_rad) for m in dataset.maps]
     own = sorted({g for g in own if g[0] > 0})
-    if len(own) >= TRIALS:
-        step = len(own) / TRIALS
-        return [own[int(k * step)] for k in range(TRIALS)]
-    frequency, pressure = FALLBACK
+    if len(own) >= FIRST.trials:
+        step = len(own) / FIRST.trials
+        return [own[int(k * step)] for k in range(FIRST.trials)]
+    frequency, pressure = FIRST.fallback_frequency_hz, FIRST.fallback_pressure_kpa
     lag = np.pi / 2
     if own:
         frequency, pressure = float(np.median([g[0] for g in own])), max(g[1] for g in own)
         lag = own[0][3]
     return [
-        (frequency * SPREAD[i], pressure * WEAKER[(i + j) % 3], OFFSETS[j], lag)
+        (
+            frequency * FIRST.frequency_shares[i],
+            pressure * FIRST.pressure_shares[(i + j) % 3],
+            FIRST.offsets[j],
+            lag,
+        )
         for i in range(3)
         for j in range(3)
     ]

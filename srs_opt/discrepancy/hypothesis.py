@@ -13,14 +13,9 @@ from srs_opt.calibrate.candidates import Candidate, effect_spec
 from srs_opt.calibrate.coordinates import Coordinate
 from srs_opt.calibrate.experiment import Experiment, Point
 from srs_opt.calibrate.fit import Fit, fit
+from srs_opt.discrepancy.gap_settings import PLAUSIBILITY
+from srs_opt.discrepancy.search_settings import SEARCH
 from srs_opt.measurement.records import Trial
-
-ITERATIONS = 20
-SMALL, LARGE = 0.15, 4.0  # sizes over typical that a named effect may have in company, and alone
-# share of the misfit that a second or later effect may leave and still count as progress: what is added is
-# the largest of what is missing, so that of three effects the third leaves no more
-LEFT = 0.5
-FAR = 3.5  # standard deviations that a calibrated value may lie from its bench value
 
 
 @dataclass(frozen=True)
@@ -75,16 +70,16 @@ class Hypothesis:
         """Return which effect would have an unlikely size; empty when none."""
         for candidate in self.candidates:
             size = self.relative_size(candidate)
-            if size > LARGE:
+            if size > PLAUSIBILITY.most_size:
                 return f"{candidate.label} would have to be {size:.1f} times its typical size"
-            if size < SMALL and len(self.candidates) > 1:
+            if size < PLAUSIBILITY.least_size and len(self.candidates) > 1:
                 return f"{candidate.label} would be only {size:.2f} of its typical size"
         return ""
 
     def against_the_bench(self) -> str:
         """Return which calibrated value would lie far from its bench value; empty when none."""
         for name, off in self.fit.off_bench.items():
-            if abs(off) > FAR:
+            if abs(off) > PLAUSIBILITY.most_bench_sd:
                 return f"{name} would lie {abs(off):.1f} standard deviations from its bench value"
         return ""
 
@@ -104,7 +99,7 @@ def fit_hypothesis(
     candidates: Sequence[Candidate],
     start: Point,
     trials: Sequence[Trial],
-    iterations: int = ITERATIONS,
+    iterations: int | None = None,
     beat: float = math.inf,
     near: float = 0.0,
     *,
@@ -112,6 +107,7 @@ def fit_hypothesis(
 ) -> Hypothesis:
     """Fit the base coordinates together with the effects of `candidates`; `near` and `rough` as for `fit`."""
     coordinates = (*base, *(c for k in candidates for c in k.coordinates))
+    iterations = SEARCH.iterations if iterations is None else iterations
     found = fit(experiment, coordinates, start, trials, iterations, beat=beat, near=near, rough=rough)
     return Hypothesis(tuple(candidates), found)
 
@@ -134,4 +130,8 @@ def left_of(before: Hypothesis, after: Hypothesis) -> float:
 def stuck(before: Hypothesis, after: Hypothesis) -> bool:
     """Whether piling up effects only nibbles at the misfit: what is missing is none of them."""
     left = left_of(before, after)
-    return len(after.candidates) > 1 and after.fit.misfit_ratio > 1.2 and left > LEFT
+    return (
+        len(after.candidates) > 1
+        and after.fit.misfit_ratio > SEARCH.stuck_misfit_ratio
+        and left > SEARCH.progress_share
+    )

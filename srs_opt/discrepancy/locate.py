@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 from srs_opt.calibrate.objective import sum_eliminated
 from srs_opt.discrepancy.diagnostics import Diagnostics
+from srs_opt.discrepancy.gap_settings import DETECTION, EXPLANATION
 from srs_opt.discrepancy.hypothesis import Hypothesis
 
-CLOSES = 0.5  # share of the misfit that a fit must close to say where the gap is
 STAGES = {
     "actuation": "valves to curvature",
     "body": "geometry of the body",
@@ -59,7 +59,7 @@ def left_places(diagnostics: Diagnostics) -> list[Place]:
     places = [
         Place(g.where, g.against, s.improvement / max(s.dof, 1), a)
         for g, s, a in zip(diagnostics.groups, detection.groups, detection.adjusted)
-        if a < 0.05
+        if a < DETECTION.place_level
     ]
     return sorted(places, key=lambda p: -p.score)
 
@@ -75,7 +75,9 @@ def stages(null: Hypothesis, fitted: Sequence[Hypothesis]) -> tuple[Place, ...]:
         return (null.fit.misfit_ratio - h.fit.misfit_ratio) / max(null.fit.misfit_ratio - 1, 1e-9)
 
     found: dict[str, Place] = {}
-    ordered = sorted((h for h in fitted if h.candidates and closed(h) >= CLOSES), key=closed, reverse=True)
+    ordered = sorted(
+        (h for h in fitted if h.candidates and closed(h) >= EXPLANATION.stage_share), key=closed, reverse=True
+    )
     for h in ordered:
         alone = len({c.form.effect.kind for c in h.candidates}) == 1
         for c in h.candidates if alone or h is ordered[0] else ():

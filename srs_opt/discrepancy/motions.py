@@ -8,15 +8,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from srs_opt.calibrate.noise import track_of
+from srs_opt.discrepancy.gap_settings import SEAL
 from srs_opt.measurement.records import Trial
-
-LEAST_STEP_M = 0.005  # advance per cycle from which a share of the speed means something
-LEAST_TURN_RAD = 0.2  # turn within the trial from which a radius means something
 
 
 def motion_errors(
     trials: Sequence[Trial],
     residuals: Sequence[np.ndarray],
+    length_m: float,
     tracks: Sequence[np.ndarray] | None = None,
 ) -> tuple[float | None, float | None]:
     """Return the root mean square errors of predicted speed and radius over the measured ones.
@@ -29,6 +28,10 @@ def motion_errors(
     trials : sequence of Trial
     residuals : sequence of array (T, 2 M)
         Measured minus predicted.
+    length_m : float
+        Of the robot.
+    tracks : sequence of array (T, 2 M), optional
+        Default: those of the trials.
 
     Returns
     -------
@@ -36,17 +39,18 @@ def motion_errors(
         None where no trial advances (or turns) enough to tell.
     """
     speeds, radii = [], []
+    least_step_m = SEAL.least_step_body * length_m
     measured_tracks = [track_of(t) for t in trials] if tracks is None else tracks
     for trial, track, residual in zip(trials, measured_tracks, residuals):
         if track is None:
             continue
         measured = _advance(trial, track)
         predicted = _advance(trial, track - residual)
-        if measured is None or predicted is None or measured[0] < LEAST_STEP_M:
+        if measured is None or predicted is None or measured[0] < least_step_m:
             continue
         speeds.append(predicted[0] / measured[0] - 1)
         cycles = (trial.time_s[-1] - trial.time_s[0]) / trial.period_s
-        if abs(measured[1]) * cycles >= LEAST_TURN_RAD and predicted[1] != 0:
+        if abs(measured[1]) * cycles >= SEAL.least_turn_rad and predicted[1] != 0:
             radii.append(predicted[0] / measured[0] * measured[1] / predicted[1] - 1)
     return _root_mean_square(speeds), _root_mean_square(radii)
 

@@ -8,6 +8,7 @@ from typing import Any
 
 from srs_opt.calibrate.result import calibrated_robot
 from srs_opt.discrepancy.answer import corrected_robot
+from srs_opt.discrepancy.gap_settings import PAYOFF
 from srs_opt.discrepancy.pipeline import Discrepancy
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait
@@ -17,8 +18,6 @@ from srs_opt.gait_opt.search import search
 from srs_opt.model.parameters import room_effects
 from srs_opt.orbit.steady import Orbit, steady_gait
 from srs_opt.robot import Robot
-
-STARTS = 2
 
 
 @dataclass(frozen=True)
@@ -114,4 +113,4 @@ def _model_of(robot: Robot, model: str | None) -> str:
 def _fastest(robot: Robot, model: str | None, tell: Callable[[str], None]) -> Gait:
     tell(f"optimizing the fastest gait of '{robot.name}'{' with its effects' if robot.effects else ''}")
     problem = CycleProblem((robot,), _model_of(robot, model), Goal("speed"), Limits().for_robot(robot))
-    return search(problem, starts=STARTS).gait
+    return search(problem, starts=PAYOFF.starts).gait

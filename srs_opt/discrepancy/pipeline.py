@@ -28,7 +28,7 @@ from srs_opt.discrepancy.screen import Score
 from srs_opt.discrepancy.seal import Gap, odd_sealed, open_seal
 from srs_opt.discrepancy.search import Search
 from srs_opt.discrepancy.select import Selection, best_rival, select
-from srs_opt.discrepancy.settings import SETTINGS, Settings
+from srs_opt.discrepancy.settings import ADEQUACY, AdequacySettings
 from srs_opt.discrepancy.split import Split, few_and_brief, split_trials
 from srs_opt.discrepancy.verdict import BELIEVED, DESCRIBED, NO_GAP, NOT_TESTABLE, UNKNOWN, Verdict, judge
 from srs_opt.discrepancy.visible import Visible, visible
@@ -199,7 +199,7 @@ def _examine(
     *,
     restricted: bool,
 ) -> Discrepancy:
-    experiment, settings = search.experiment, SETTINGS.of_body(dataset.robot.length_m)
+    experiment, settings = search.experiment, ADEQUACY.of_body(dataset.robot.length_m)
     tell(f"calibrating on {len(split.open)} trials")
     first = search.calibrate()
     if first is None:
@@ -271,7 +271,7 @@ def _examine(
     )
 
 
-def _repeat(null: Diagnostics, split: Split, gap: Gap | None, settings: Settings) -> NextExperiment:
+def _repeat(null: Diagnostics, split: Split, gap: Gap | None, settings: AdequacySettings) -> NextExperiment:
     """Return that the trial which calibration alone misses most be repeated.
 
     A sealed one where the open ones show nothing.

@@ -17,6 +17,7 @@ from srs_opt.calibrate.coordinates import Coordinate
 from srs_opt.calibrate.experiment import Point
 from srs_opt.calibrate.normal_equations import NormalEquations, bounded_solve
 from srs_opt.calibrate.objective import priors, sum_eliminated
+from srs_opt.discrepancy.search_settings import SCREEN
 
 
 @dataclass(frozen=True)
@@ -140,7 +141,7 @@ def expected_start(lin: Linearisation, score: Score, damped: float = 1.0) -> Poi
     """Return where to begin a refit with the candidate added: at its expected sizes, within reason."""
     values = dict(lin.point.values)
     for coordinate, step in zip(score.candidate.sizes, score.step):
-        reach = 2.0 * coordinate.typical
+        reach = SCREEN.start_reach * coordinate.typical
         values[coordinate.name] = float(np.clip(damped * step, -reach, reach))
     for coordinate in score.candidate.scales:
         values[coordinate.name] = coordinate.start

@@ -10,14 +10,10 @@ import numpy as np
 from srs_opt.calibrate.apart import own_scatter
 from srs_opt.calibrate.experiment import Experiment
 from srs_opt.calibrate.fit import Fit
+from srs_opt.discrepancy.gap_settings import SEAL
 from srs_opt.discrepancy.motions import motion_errors
-from srs_opt.discrepancy.settings import SETTINGS, Settings
+from srs_opt.discrepancy.settings import ADEQUACY, AdequacySettings
 from srs_opt.measurement.records import Trial
-
-BLOCK_S = 0.5
-DRAWS = 2000
-CORRELATION_S = 1 / 60  # misfit lasts longer than this, noise not a single frame
-MEASURABLE = 0.02  # of the floor that a gap must stand above it for a share of it to mean something
 
 
 @dataclass(frozen=True)
@@ -117,7 +113,7 @@ def open_seal(
         return None
     first = sealed_residuals(experiment, before, trials)
     second = first if after is before else sealed_residuals(experiment, after, trials)
-    correlated_m = experiment.noise.correlated_sd_m
+    correlated_m, length_m = experiment.noise.correlated_sd_m, experiment.model.robot.length_m
     blocks = _blocks(trials, [first, second])
     rng = np.random.default_rng([seed, 23])
     total = blocks.sum(axis=0)
@@ -125,21 +121,21 @@ def open_seal(
     ratio, interval = _ratio(sizes), None
     drawn = [
         _ratio(_sizes(blocks[rng.integers(len(blocks), size=len(blocks))].sum(axis=0), correlated_m))
-        for _ in range(DRAWS)
+        for _ in range(SEAL.draws)
     ]
     usable = np.array([r for r in drawn if r is not None])
-    if ratio is not None and usable.size > DRAWS // 2:
+    if ratio is not None and usable.size > SEAL.draws // 2:
         low, high = np.quantile(usable, [0.05, 0.95])
         interval = (float(low), float(high))
     rival_m = None
     if rival is not None and ratio is not None:
-        rival_m = _remainder(trials, sealed_residuals(experiment, rival, trials), correlated_m).m
-    remainders = [_remainder(trials, r, correlated_m) for r in (first, second)]
+        rival_m = _remainder(trials, sealed_residuals(experiment, rival, trials), correlated_m, length_m).m
+    remainders = [_remainder(trials, r, correlated_m, length_m) for r in (first, second)]
     error = sizes[2] * float(np.sqrt(4 / np.sqrt(max(total[4], 1.0))))
     return Gap(*sizes, ratio, interval, len(trials), remainders[0], remainders[1], error, rival_m)
 
 
-def odd_sealed(gap: Gap | None, settings: Settings = SETTINGS) -> dict[str, str]:
+def odd_sealed(gap: Gap | None, settings: AdequacySettings = ADEQUACY) -> dict[str, str]:
     """Return the few sealed trials that the best model misses by far more than the others, and why.
 
     A wrong entry in a notebook spoils one trial; what the model lacks shows in several.
@@ -159,11 +155,15 @@ def odd_sealed(gap: Gap | None, settings: Settings = SETTINGS) -> dict[str, str]
     }
 
 
-def _remainder(trials: Sequence[Trial], residuals: Sequence[np.ndarray], correlated_m: float) -> Remainder:
+def _remainder(
+    trials: Sequence[Trial], residuals: Sequence[np.ndarray], correlated_m: float, length_m: float
+) -> Remainder:
     """Return what residuals hold beyond the noise: what the frames after repeat."""
     sums = [np.array([np.nansum(p), np.isfinite(p).sum()]) for p in map(_repeated, trials, residuals)]
     by_trial = {t.name: _beyond(s, correlated_m) for t, s in zip(trials, sums)}
-    return Remainder(_beyond(np.sum(sums, axis=0), correlated_m), *motion_errors(trials, residuals), by_trial)
+    return Remainder(
+        _beyond(np.sum(sums, axis=0), correlated_m), *motion_errors(trials, residuals, length_m), by_trial
+    )
 
 
 def _beyond(sums: np.ndarray, correlated_m: float) -> float:
@@ -175,7 +175,7 @@ def _blocks(trials: Sequence[Trial], residuals: list[list[np.ndarray]]) -> np.nd
     of products of residuals after and of those a few frames later, and their count."""
     rows = []
     for trial, before, after in zip(trials, *residuals):
-        number = np.floor(trial.time_s / BLOCK_S).astype(int)
+        number = np.floor(trial.time_s / SEAL.block_s).astype(int)
         products = _repeated(trial, after)
         for k in np.unique(number):
             b, a, c = before[number == k], after[number == k], products[:, number == k]
@@ -186,8 +186,8 @@ def _blocks(trials: Sequence[Trial], residuals: list[list[np.ndarray]]) -> np.nd
 
 def _repeated(trial: Trial, residual: np.ndarray) -> np.ndarray:
     """Return products of residuals (T, n) with those 1 ... some frames later, (lags, T, n), NaN beyond."""
-    frame = float(np.median(np.diff(trial.time_s))) if trial.time_s.size > 1 else CORRELATION_S
-    lags = max(1, int(CORRELATION_S / frame + 1e-6))
+    frame = float(np.median(np.diff(trial.time_s))) if trial.time_s.size > 1 else SEAL.correlation_s
+    lags = max(1, int(SEAL.correlation_s / frame + 1e-6))
     found = np.full((lags, *residual.shape), np.nan)
     for lag in range(1, min(lags, residual.shape[0] - 1) + 1):
         found[lag - 1, :-lag] = residual[lag:] * residual[:-lag]
@@ -204,6 +204,6 @@ def _sizes(total: np.ndarray, correlated_m: float) -> tuple[float, float, float]
 
 def _ratio(sizes: tuple[float, float, float]) -> float | None:
     before, after, floor = sizes
-    if before - floor <= MEASURABLE * floor:
+    if before - floor <= SEAL.measurable_share * floor:
         return None
     return (after - floor) / (before - floor)

@@ -15,42 +15,16 @@ from srs_opt.calibrate.slow import smooth_part
 from srs_opt.discrepancy.diagnostics import Diagnostics, explainable, explained, needed_gain
 from srs_opt.discrepancy.examine import examined, linearised, screened_of
 from srs_opt.discrepancy.functions import ResidualFunctions
-from srs_opt.discrepancy.hypothesis import (
-    ITERATIONS,
-    LEFT,
-    SMALL,
-    Hypothesis,
-    cost,
-    fit_hypothesis,
-    fit_key,
-    left_of,
-    stuck,
-)
+from srs_opt.discrepancy.gap_settings import PLAUSIBILITY
+from srs_opt.discrepancy.hypothesis import Hypothesis, cost, fit_hypothesis, fit_key, left_of, stuck
 from srs_opt.discrepancy.promising import akin, promising
 from srs_opt.discrepancy.screen import Score, expected_start, screen
+from srs_opt.discrepancy.search_settings import SEARCH
 from srs_opt.discrepancy.soft_start import soft_start
 from srs_opt.discrepancy.split import brief_name
 from srs_opt.errors import NoAnswerError
 from srs_opt.measurement.records import Trial
 
-NULL_ITERATIONS, POLISH = 12, 40
-DEEPEST, ROUNDS = 4, 6  # effects at once; additions or exchanges in all
-DEEPEST_BRIEF = 3  # with the first seconds of a few trials
-# Deviance within which two sets of effects cannot be told apart. The truth falls behind a rival by D with
-# probability Phi(-sqrt(D)) at worst, whatever separates the two: under 1 % here, so that the sets that are
-# kept hold the truth at 95 % with several rivals.
-RIVAL = 6.0
-_MOST_REFITS = (5, 4, 3, 3)
-QUICK_ITERATIONS = 10  # with the first seconds of a few trials, before all are asked
-# shares of the misfit that fits which do not explain the data may leave to be gained: those, and all others
-ROUGHLY, NEARLY = 0.01, 0.001
-HOPELESS = 0.1  # share of the gap that the best known effects leave, from which on more data help nothing
-NEARER = 0.2  # of the size that derivatives promise, from which a refit that got lost is begun again
-# refits with the best of the screen before one with a bending body, which costs as much as three of others
-BEFORE_BENDING = 2
-FIRM = 10.0  # standard deviations from zero at which an effect is not superfluous, without a refit
-# deviance behind the best, and number, of sets that are fitted again when the noise turns out another
-REFITTED, MOST_REFITTED = 60.0, 5
 Report = Callable[[str], None]
 
 
@@ -85,7 +59,7 @@ class Search:
         self.report = report or (lambda message: None)
         self.quick = tuple(quick) or self.trials
         self.screened = screened_of(self.trials, self.quick)
-        self.deepest = DEEPEST
+        self.deepest = SEARCH.most_effects
         self._fits: dict[tuple[frozenset[str], bool], Hypothesis] = {}
         self._earlier: list[Hypothesis] = []  # under another noise
         self._examined: Diagnostics | None = None  # last
@@ -111,16 +85,17 @@ class Search:
         self,
         candidates: Sequence[Candidate],
         start: Point,
-        iterations: int = ITERATIONS,
+        iterations: int | None = None,
         beat: float = math.inf,
         *,
         quick: bool = False,
-        near: float = NEARLY,
+        near: float | None = None,
     ) -> Hypothesis | None:
         """Fit a set of effects; None where the motion cannot be simulated."""
         quick = quick and self.quick != self.trials
         trials = self.quick if quick else self.trials
         key = fit_key(candidates, quick)
+        near = SEARCH.fine_gain_share if near is None else near
         known = self._fits.get(key)
         if known is not None and known.fit.converged:
             return known
@@ -141,7 +116,9 @@ class Search:
         self, candidates: Sequence[Candidate], start: Point, beat: float = math.inf
     ) -> Hypothesis | None:
         """Fit a set of effects roughly, to the start of a few trials."""
-        return self.fit(candidates, start, QUICK_ITERATIONS, beat, quick=True, near=ROUGHLY)
+        return self.fit(
+            candidates, start, SEARCH.quick_iterations, beat, quick=True, near=SEARCH.rough_gain_share
+        )
 
     def calibrate(self, start: Point | None = None, give_up: float = math.inf) -> Hypothesis | None:
         """Fit the model without effects, first to the start of a few trials.
@@ -154,7 +131,7 @@ class Search:
             if first.fit.variance_inflation > give_up:
                 return first
             start = first.fit.point
-        return self.fit((), start, NULL_ITERATIONS, near=ROUGHLY)
+        return self.fit((), start, SEARCH.null_iterations, near=SEARCH.rough_gain_share)
 
     def coloured(self, calibrated: Hypothesis) -> Hypothesis:
         """Return calibration alone under the noise that its residuals show to be correlated in time."""
@@ -202,8 +179,8 @@ class Search:
 
     def _with_rivals(self) -> list[Hypothesis]:
         """Return what was fitted, and the best that were fitted under another noise fitted anew."""
-        earlier = sorted((h for h in self._earlier if h.candidates), key=cost)[:MOST_REFITTED]
-        for h in [e for e in earlier if cost(e) < cost(earlier[0]) + REFITTED]:
+        earlier = sorted((h for h in self._earlier if h.candidates), key=cost)[: SEARCH.most_refitted]
+        for h in [e for e in earlier if cost(e) < cost(earlier[0]) + SEARCH.refitted_deviance]:
             self.again(h)
         return self.fitted
 
@@ -214,12 +191,12 @@ class Search:
     def run(self, null: Diagnostics) -> tuple[Diagnostics, list[Hypothesis]]:
         """Return the best set of effects, examined, and everything that was refitted."""
         current, ended = self._begun(null)
-        for _ in range(0 if ended else ROUNDS):
+        for _ in range(0 if ended else SEARCH.rounds):
             depth = len(current.hypothesis.candidates)
             if depth >= self.deepest:
                 break
             better = self._refit(
-                current, promising(current, depth, len(self.candidates)), _MOST_REFITS[depth]
+                current, promising(current, depth, len(self.candidates)), SEARCH.refits_by_effects[depth]
             )
             better = self._swapped(current, better)
             if better is None or not self._worth(better, current.hypothesis):
@@ -240,7 +217,7 @@ class Search:
         if self.quick == self.trials:
             return null, False
         brief = Search(self.experiment, self.base, self.candidates, self.quick, self.seed, self.report)
-        brief.deepest = DEEPEST_BRIEF
+        brief.deepest = SEARCH.most_effects_brief
         brief._fits = {(names, False): h for (names, quick), h in self._fits.items() if quick}
         first = brief.calibrate(null.hypothesis.fit.point)
         if first is None:
@@ -251,13 +228,15 @@ class Search:
             self._fits |= {(names, True): h for (names, _), h in brief._fits.items()}
         near = [best.hypothesis]
         if brief._settled(start, best):  # else it has no rivals: it explains nothing yet
-            most, limit = len(best.hypothesis.candidates), cost(best.hypothesis) + 2 * RIVAL
+            most, limit = len(best.hypothesis.candidates), cost(best.hypothesis) + 2 * SEARCH.rival_deviance
             near = [h for h in fitted if 0 < len(h.candidates) <= most and cost(h) < limit]
         better = self._best_of_whole(near) if best.hypothesis.candidates else None
         if better is None or not self._worth(better, null.hypothesis):
             return null, False
         current = self.noise_aware(self._pruned(self.examine(self._polished(better))))
-        hopeless = left_of(start.hypothesis, best.hypothesis) > HOPELESS and not explainable(current)
+        hopeless = left_of(start.hypothesis, best.hypothesis) > SEARCH.hopeless_share and not explainable(
+            current
+        )
         return current, hopeless or self._settled(null, current)
 
     def _best_of_whole(self, tried: Sequence[Hypothesis]) -> Hypothesis | None:
@@ -270,7 +249,7 @@ class Search:
         fit = hypothesis.fit
         if fit.converged or fit.variance_inflation > FAR_OFF:
             return hypothesis
-        return self.fit(hypothesis.candidates, fit.point, POLISH) or hypothesis
+        return self.fit(hypothesis.candidates, fit.point, SEARCH.polish_iterations) or hypothesis
 
     def _settled(self, null: Diagnostics, current: Diagnostics) -> bool:
         """Whether there is nothing left to look for.
@@ -293,7 +272,7 @@ class Search:
             rest = tuple(c for c in have if c is not dropped)
             exchanged = (*rest, scores[0].candidate)
             rival = current.hypothesis if best is None else best
-            limit = self._tried_out(rival) + 2 * RIVAL
+            limit = self._tried_out(rival) + 2 * SEARCH.rival_deviance
             tried = self.try_out(exchanged, start, limit)
             if tried is None or cost(tried) > limit:
                 continue
@@ -319,7 +298,7 @@ class Search:
         explains: Hypothesis | None = None
         bending = [s for s in proposals if s.candidate.form.effect.bends]
         others = [s for s in proposals if s not in bending][: 2 * most - len(bending)]
-        before = len(others) if have else BEFORE_BENDING
+        before = len(others) if have else SEARCH.refits_before_bending
         for score in (*others[:before], *bending, *others[before:]):
             if have and score in bending and self._gets_on(found, current):
                 continue
@@ -331,7 +310,7 @@ class Search:
                 beat = math.inf  # it begins far off, and explains nothing until it comes near
             hypothesis = self.try_out((*have, score.candidate), start, beat)
             if hypothesis is not None and score not in bending and self._lost(hypothesis, current):
-                nearer = expected_start(current.linearisation, score, NEARER)
+                nearer = expected_start(current.linearisation, score, SEARCH.restart_share)
                 hypothesis = self.try_out((*have, score.candidate), nearer, beat)
             if hypothesis is not None:
                 found.append(hypothesis)
@@ -343,18 +322,18 @@ class Search:
         if not found:
             return None
         found.sort(key=cost)
-        near = [h for h in found if cost(h) < cost(found[0]) + 2 * RIVAL]
+        near = [h for h in found if cost(h) < cost(found[0]) + 2 * SEARCH.rival_deviance]
         return self._best_of_whole(near)
 
     def _gets_on(self, found: Sequence[Hypothesis], current: Diagnostics) -> bool:
         """Whether one of some refits leaves less of the misfit than counts as progress."""
         without = self._fits.get(fit_key(current.hypothesis.candidates, self.quick != self.trials))
-        return without is not None and any(left_of(without, h) < LEFT for h in found)
+        return without is not None and any(left_of(without, h) < SEARCH.progress_share for h in found)
 
     def _lost(self, added: Hypothesis, current: Diagnostics) -> bool:
         """Whether a refit ended worse than without the effect that it adds, which it holds at size zero.
 
-        Slopes about a fit that is far off promise too much; begun there, a fit may not find back.
+        Derivatives about a fit that is far off promise too much; begun there, a fit may not find back.
         """
         without = self._fits.get(fit_key(current.hypothesis.candidates, self.quick != self.trials))
         return without is not None and added.deviance > without.deviance
@@ -375,13 +354,13 @@ class Search:
         have = current.hypothesis.candidates
         if len(have) < 2:
             return current
-        small = [c for c in have if current.hypothesis.relative_size(c) < SMALL]
+        small = [c for c in have if current.hypothesis.relative_size(c) < PLAUSIBILITY.least_size]
         if small and len(small) < len(have):
             rest = tuple(c for c in have if c not in small)
             smaller = self.fit(rest, current.hypothesis.fit.point)
             return current if smaller is None else self._pruned(self.examine(smaller))
         for dropped in have[:-1]:
-            if current.hypothesis.firmness(dropped) > FIRM:
+            if current.hypothesis.firmness(dropped) > SEARCH.certain_sd:
                 continue
             rest = tuple(c for c in have if c is not dropped)
             allowed = needed_gain(dropped, len(self.candidates))

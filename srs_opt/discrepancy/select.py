@@ -11,7 +11,7 @@ from srs_opt.calibrate.fit import Fit
 from srs_opt.calibrate.normal_equations import bounded_solve
 from srs_opt.calibrate.objective import priors
 from srs_opt.discrepancy.hypothesis import Hypothesis
-from srs_opt.discrepancy.search import RIVAL
+from srs_opt.discrepancy.search_settings import SEARCH
 from srs_opt.discrepancy.split import Split
 
 
@@ -40,11 +40,11 @@ class Selection:
 def select(best: Hypothesis, fitted: Sequence[Hypothesis], split: Split) -> Selection:
     """Return the rivals of `best` among all fitted hypotheses.
 
-    A rival explains the data about as well (deviance within RIVAL, counting 2 per parameter), under another
-    name, without leaving physics or the bench behind, and holds no effect beyond those of a smaller rival.
-    Where the best leaves a misfit, differences are judged as if that were noise too.
+    A rival explains the data about as well (deviance within `rival_deviance`, counting 2 per parameter),
+    under another name, without leaving physics or the bench behind, and holds no effect beyond those of a
+    smaller rival. Where the best leaves a misfit, differences are judged as if that were noise too.
     """
-    own, reach = best.deviance + 2 * best.parameters, RIVAL * best.fit.variance_inflation
+    own, reach = best.deviance + 2 * best.parameters, SEARCH.rival_deviance * best.fit.variance_inflation
     near = [
         h
         for h in fitted

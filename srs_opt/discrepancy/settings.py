@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 
 @dataclass(frozen=True)
-class Settings:
+class AdequacySettings:
     """The rule of adequacy.
 
     With enough data every model is rejected: the statistics only say whether something is left. Whether it
@@ -45,6 +45,8 @@ class Settings:
     closed, nearly_closed : float
         Of a small gap, the share of its height above the noise floor that an effect which leaves nothing
         significant may leave: `closed`, or `nearly_closed` where the 90 % interval reaches `closed`.
+    unseen : float
+        A remainder below it no camera sees.
     body_m : float
         The body's length.
     """
@@ -65,9 +67,10 @@ class Settings:
     off_times: float = 5.0
     closed: float = 0.25
     nearly_closed: float = 0.5
+    unseen: float = 2e-5 / 0.236
     body_m: float = 0.236
 
-    def of_body(self, length_m: float) -> Settings:
+    def of_body(self, length_m: float) -> AdequacySettings:
         """Return the rule for a robot of that length."""
         return replace(self, body_m=length_m)
 
@@ -92,4 +95,43 @@ class Settings:
         return self.off * self.body_m
 
 
-SETTINGS = Settings()
+@dataclass(frozen=True)
+class DescriptionSettings:
+    """What a description must do to be given.
+
+    Attributes
+    ----------
+    closed_share : float
+        Share of the gap on sealed trials.
+    rival_share : float
+        Share of what the next best explanation leaves (the best listed effects, or a term that acts on
+        something else or elsewhere) that this one may leave at most.
+    refits : int
+        Terms that are fitted, the best of the screens.
+    exchanges : int
+        Rounds of looking for a better term from where the best one stands.
+    promising_share : float
+        Share of what the best of a screen promises from which on a term can be the better one. Twice as much
+        would leave out terms of which derivatives far from the fit say little.
+    most_bench_sd : float
+        Standard deviations that a calibrated value may lie from its bench value; twice what it may with a
+        named effect, because a term is only an approximation of what is there.
+    explained_share : float
+        Share of the misfit that the best may leave and need not be exchanged.
+    told_deviance : float
+        Deviance, on all open trials, by which another explanation is told from one that leaves nothing
+        significant, however little it leaves itself: a few times what chance makes of look-alikes.
+    """
+
+    closed_share: float = 0.75
+    rival_share: float = 0.5
+    refits: int = 7
+    exchanges: int = 3
+    promising_share: float = 0.1
+    most_bench_sd: float = 7.0
+    explained_share: float = 0.02
+    told_deviance: float = 20.0
+
+
+ADEQUACY = AdequacySettings()
+DESCRIPTION = DescriptionSettings()

@@ -15,11 +15,9 @@ from srs_opt.calibrate.coordinates import SCATTER_SD, Coordinate
 from srs_opt.calibrate.experiment import Experiment, Point
 from srs_opt.calibrate.fit import start_point
 from srs_opt.discrepancy.hypothesis import Hypothesis
+from srs_opt.discrepancy.search_settings import SCREEN
 from srs_opt.errors import NoAnswerError
 from srs_opt.measurement.records import Trial
-
-# of the typical size; from 0.35 alone flexibilities up to 200 1/(N m^2) were found and 330 was not
-LEAPS = (0.35, 1.0, 2.0)
 
 
 def soft_start(
@@ -44,4 +42,6 @@ def soft_start(
             return math.inf
         return sum(normal.misfit for normal in equations.values())
 
-    return min((Point({**values, size.name: leap * size.typical}) for leap in LEAPS), key=misfit)
+    return min(
+        (Point({**values, size.name: leap * size.typical}) for leap in SCREEN.soft_start_sizes), key=misfit
+    )

@@ -14,12 +14,8 @@ from zlib import crc32
 import numpy as np
 
 from srs_opt.calibrate.rejection import left_out
+from srs_opt.discrepancy.search_settings import SPLIT
 from srs_opt.measurement.records import Trial
-
-SEALED_SHARE = 0.25
-LEAST_OPEN, LEAST_SEALED = 3, 1
-FOLDS = 3
-FEW, BRIEF_S = 5, 3.0  # trials, and seconds of each, on which a fit is first tried
 
 
 @dataclass(frozen=True)
@@ -49,7 +45,7 @@ class Split:
     @property
     def enough(self) -> bool:
         """Whether there is anything to test on."""
-        return len(self.open) >= LEAST_OPEN and len(self.sealed) >= LEAST_SEALED
+        return len(self.open) >= SPLIT.least_open and len(self.sealed) >= SPLIT.least_sealed
 
     def without(self, reasons: Mapping[str, str]) -> Split:
         """Return the split with open trials left out, by name, for a reason."""
@@ -63,10 +59,10 @@ def split_trials(trials: Sequence[Trial]) -> Split:
     reasons = left_out(trials)
     good = [t for t in trials if t.name not in reasons]
     groups = _conditions(good)
-    chosen = _chosen(groups, len(good)) if len(good) > LEAST_OPEN else []
+    chosen = _chosen(groups, len(good)) if len(good) > SPLIT.least_open else []
     sealed = [t for t in good if any(t in groups[k] for k in chosen)]
     rest = [t for t in good if t not in sealed]
-    folds: list[list[str]] = [[] for _ in range(min(FOLDS, len(rest)))]
+    folds: list[list[str]] = [[] for _ in range(min(SPLIT.folds, len(rest)))]
     for k, group in enumerate(groups[k] for k in range(len(groups)) if k not in chosen):
         if folds:
             folds[k % len(folds)] += [t.name for t in group]
@@ -100,21 +96,21 @@ def _conditions(trials: Sequence[Trial]) -> list[list[Trial]]:
         for t in trials:
             groups[key(t)].append(t)
         found = [groups[k] for k in sorted(groups, key=repr)]
-        if len(found) > LEAST_OPEN and len(trials) - min(map(len, found)) >= LEAST_OPEN:
+        if len(found) > SPLIT.least_open and len(trials) - min(map(len, found)) >= SPLIT.least_open:
             break
     return found
 
 
 def _chosen(groups: Sequence[Sequence[Trial]], trials: int) -> list[int]:
     """Return which groups to seal: the middle one, then such as share least with those chosen."""
-    wanted = max(round(SEALED_SHARE * trials), LEAST_SEALED)
+    wanted = max(round(SPLIT.sealed_share * trials), SPLIT.least_sealed)
     order = [k for k in _from_the_middle([g[0] for g in groups]) if groups[k][0].kind != "still"]
     chosen: list[int] = []
     count = 0
     while count < wanted:
         rest = [k for k in order if k not in chosen]
         fits = [k for k in rest if count + len(groups[k]) <= max(wanted, trials // 3, 1)]
-        fits = [k for k in fits if trials - count - len(groups[k]) >= LEAST_OPEN]
+        fits = [k for k in fits if trials - count - len(groups[k]) >= SPLIT.least_open]
         if not fits:
             break
         # a gait of many replicates would use up the share and leave fewer gaits to predict
@@ -145,12 +141,12 @@ def few_and_brief(trials: Sequence[Trial]) -> tuple[Trial, ...]:
     chosen: list[Trial] = []
     named = sorted(trials, key=lambda t: (repr(gait_of(t)), t.heading_rad, t.name))
     order = [named[k] for k in _from_the_middle(named)] if named else []
-    while len(chosen) < min(FEW, len(trials)):
+    while len(chosen) < min(SPLIT.brief_trials, len(trials)):
         rest = [t for t in order if t not in chosen]
         chosen.append(min(rest, key=lambda t: sum(_shared(t, c) for c in chosen)))
     found = tuple(_first_seconds(t) for t in trials if t in chosen)
     whole, part = (sum(float(t.time_s[-1]) for t in some) for some in (trials, found))
-    return found if part < 0.7 * whole else ()
+    return found if part < SPLIT.brief_share * whole else ()
 
 
 def brief_name(name: str) -> str:
@@ -159,7 +155,7 @@ def brief_name(name: str) -> str:
 
 
 def _first_seconds(trial: Trial) -> Trial:
-    seen = trial.time_s - trial.time_s[0] <= BRIEF_S
+    seen = trial.time_s - trial.time_s[0] <= SPLIT.brief_s
     markers = None if trial.markers_m is None else trial.markers_m[seen]
     centre = None if trial.centre_m is None else trial.centre_m[seen]
     return replace(

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from srs_opt.discrepancy.diagnostics import ADEQUATE, Diagnostics, explained
+from srs_opt.discrepancy.diagnostics import Diagnostics, explained
+from srs_opt.discrepancy.gap_settings import DETECTION
 from srs_opt.discrepancy.locate import left_places
 from srs_opt.discrepancy.seal import Gap
 from srs_opt.discrepancy.select import Selection
-from srs_opt.discrepancy.settings import SETTINGS, Settings
+from srs_opt.discrepancy.settings import ADEQUACY, AdequacySettings
 
 NO_GAP, NAMED, ONE_OF, UNKNOWN, NOT_TESTABLE = "no_gap", "named", "one_of", "unknown", "not_testable"
 NAMED_IN_PART, DESCRIBED = "named_in_part", "described"
 BELIEVED = (NAMED, NAMED_IN_PART, DESCRIBED)
-UNSEEN_M = 2e-5  # no camera sees less
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ def judge(
     best: Diagnostics,
     selection: Selection | None,
     gap: Gap | None,
-    settings: Settings = SETTINGS,
+    settings: AdequacySettings = ADEQUACY,
     *,
     restricted: bool = False,
 ) -> Verdict:
@@ -54,7 +54,9 @@ def judge(
         names = " or ".join(" + ".join(h.names) for h in (selection.best, *selection.rivals))
         return Verdict(ONE_OF, f"the data cannot tell between {names}")
     if not doubt:
-        return Verdict(NAMED, f"{label} explains the gap, and nothing else known does{_further(best, gap)}")
+        return Verdict(
+            NAMED, f"{label} explains the gap, and nothing else known does{_further(best, gap, settings)}"
+        )
     if gap is not None and negligible(gap, settings):
         return Verdict(NO_GAP, f"{_small(gap)}; the best known explanation would be {label}, but {doubt}")
     if gap is not None and _sure_in_part(selection, gap, settings, restricted=restricted):
@@ -64,13 +66,13 @@ def judge(
     )
 
 
-def negligible(gap: Gap, settings: Settings = SETTINGS) -> bool:
+def negligible(gap: Gap, settings: AdequacySettings = ADEQUACY) -> bool:
     """Whether what calibration alone leaves on the sealed trials is too small to matter."""
     speed = gap.before.speed_share or 0.0
     return gap.before.m <= settings.negligible_m and speed <= settings.negligible_speed
 
 
-def _no_gap(gap: Gap | None, p: float, settings: Settings) -> Verdict:
+def _no_gap(gap: Gap | None, p: float, settings: AdequacySettings) -> Verdict:
     """Return the verdict where the open trials show nothing: the sealed ones are asked too."""
     if gap is not None and not negligible(gap, settings) and gap.before.m > gap.floor_error_m:
         return Verdict(
@@ -84,7 +86,7 @@ def _no_gap(gap: Gap | None, p: float, settings: Settings) -> Verdict:
 
 
 def _doubt(
-    null: Diagnostics, best: Diagnostics, selection: Selection, gap: Gap | None, settings: Settings
+    null: Diagnostics, best: Diagnostics, selection: Selection, gap: Gap | None, settings: AdequacySettings
 ) -> str:
     """Return what counts against the best set of effects; empty when nothing does."""
     against = selection.best.implausible()
@@ -94,7 +96,7 @@ def _doubt(
         if gap is None or gap.ratio is None or _closed(gap, settings):
             return ""
         return f"it closes only {1 - gap.ratio:.0%} of the gap on the sealed trials"
-    left = f"something is left (p = {best.detection.p_value:.2g}, limit {ADEQUATE:g})"
+    left = f"something is left (p = {best.detection.p_value:.2g}, limit {DETECTION.adequate_level:g})"
     if gap is None or gap.share is None:
         return left
     nearly_all = gap.share <= settings.left_share and gap.after.m <= settings.left_m
@@ -105,7 +107,7 @@ def _doubt(
     return ""
 
 
-def _closed(gap: Gap, settings: Settings) -> bool:
+def _closed(gap: Gap, settings: AdequacySettings) -> bool:
     """Whether a set of effects that leaves nothing significant closes the gap on the sealed trials."""
     if gap.ratio is None or gap.interval is None:
         return False
@@ -115,11 +117,11 @@ def _closed(gap: Gap, settings: Settings) -> bool:
     return gap.ratio <= settings.closed or near
 
 
-def _small_rest(gap: Gap, settings: Settings) -> bool:
+def _small_rest(gap: Gap, settings: AdequacySettings) -> bool:
     return gap.after.m <= settings.small_m and (gap.share or 0.0) <= settings.small_share
 
 
-def _sure_in_part(selection: Selection, gap: Gap, settings: Settings, *, restricted: bool) -> bool:
+def _sure_in_part(selection: Selection, gap: Gap, settings: AdequacySettings, *, restricted: bool) -> bool:
     """Whether every effect of the best set is sure to be a part of what is missing."""
     best = selection.best
     if best.implausible_size() or gap.share is None or selection.rivals:
@@ -148,9 +150,9 @@ def _small(gap: Gap) -> str:
     )
 
 
-def _further(best: Diagnostics, gap: Gap | None) -> str:
+def _further(best: Diagnostics, gap: Gap | None, settings: AdequacySettings) -> str:
     """Return what is told beside a name: a remainder that is significant."""
-    if gap is None or best.adequate or gap.after.m < UNSEEN_M:
+    if gap is None or best.adequate or gap.after.m < settings.unseen * settings.body_m:
         return ""
     closes = "" if gap.share is None else f"it closes {max(1 - gap.share, 0.0):.1%} of it, "
     left = f"{1e3 * gap.after.m:.2g} mm{_in_speed(gap.after.speed_share)}"

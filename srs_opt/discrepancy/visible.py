@@ -13,14 +13,11 @@ from srs_opt.calibrate.noise import track_of
 from srs_opt.calibrate.normal_equations import RANK
 from srs_opt.calibrate.objective import priors, projected, sum_eliminated
 from srs_opt.discrepancy.diagnostics import Diagnostics, needed_gain
-from srs_opt.discrepancy.hypothesis import LARGE
+from srs_opt.discrepancy.gap_settings import PLAUSIBILITY, VISIBLE
 from srs_opt.discrepancy.motions import motion_errors
-from srs_opt.discrepancy.settings import SETTINGS, Settings
+from srs_opt.discrepancy.settings import ADEQUACY, AdequacySettings
 from srs_opt.errors import NoAnswerError
 from srs_opt.measurement.records import Trial
-
-SURELY = 1.28  # standard deviations above the level of detection: found nine times in ten
-_TRIALS = 2  # on which the effects are played: each costs a simulation per effect
 
 
 @dataclass(frozen=True)
@@ -58,7 +55,7 @@ def visible(
     null: Diagnostics,
     candidates: Sequence[Candidate],
     trials: Sequence[Trial],
-    settings: Settings = SETTINGS,
+    settings: AdequacySettings = ADEQUACY,
 ) -> Visible:
     """Return the smallest missing effect that the open trials would have shown.
 
@@ -80,7 +77,7 @@ def visible(
             (_least(left[k, k], total[lin.fitted + k, lin.fitted + k], c, len(null.scores)), c)
             for k, c in columns
         ]
-        seen = [(s, c) for s, c in found if s <= LARGE * c.sizes[0].typical]
+        seen = [(s, c) for s, c in found if s <= PLAUSIBILITY.most_size * c.sizes[0].typical]
         if found and not seen:
             unseen.append(effect)
         if seen:
@@ -110,7 +107,7 @@ def visible(
             continue
         moved = [b - a for a, b in zip(after, before)]
         as_if = [t - b for t, b in zip(tracks, before)]
-        figures.append(motion_errors(played, moved, as_if))
+        figures.append(motion_errors(played, moved, experiment.model.robot.length_m, as_if))
     speed, radius = (_largest([f[k] for f in figures], settings.negligible_speed) for k in (0, 1))
     return Visible(seen_m, speed, radius, tuple(unseen))
 
@@ -123,7 +120,7 @@ def _largest(values: Sequence[float | None], floor: float) -> float | None:
 
 def _needed(candidate: Candidate, family: int) -> float:
     """Return the deviations from zero at which an effect is found nine times in ten."""
-    return float(np.sqrt(needed_gain(candidate, family))) + SURELY
+    return float(np.sqrt(needed_gain(candidate, family))) + VISIBLE.detected_sd
 
 
 def _least(information: float, whole: float, candidate: Candidate, family: int) -> float:
@@ -139,5 +136,5 @@ def _least(information: float, whole: float, candidate: Candidate, family: int) 
 def _spread(trials: Sequence[Trial]) -> list[Trial]:
     """Return a few trials, straight and turning."""
     ordered = sorted(trials, key=lambda t: (t.offset, t.name))
-    count = min(_TRIALS, len(ordered))
+    count = min(VISIBLE.trials, len(ordered))
     return [ordered[round(k * (len(ordered) - 1) / max(count - 1, 1))] for k in range(count)]

@@ -14,7 +14,8 @@ from srs_opt.calibrate.instruments import check_expectations
 from srs_opt.calibrate.model import Model
 from srs_opt.calibrate.result import bench_warnings
 from srs_opt.calibrate.run import calibrate
-from srs_opt.discrepancy.soft_start import LEAPS, soft_start
+from srs_opt.discrepancy.search_settings import SCREEN
+from srs_opt.discrepancy.soft_start import soft_start
 from srs_opt.effects import all_effects
 from srs_opt.errors import InputError
 from srs_opt.measurement.dataset import load_dataset
@@ -74,7 +75,7 @@ def test_the_effect_makes_a_rigid_robot_soft(dataset):
     assert not bench_warnings(found.off_bench)
 
 
-@pytest.mark.parametrize("leap", LEAPS)
+@pytest.mark.parametrize("leap", SCREEN.soft_start_sizes)
 def test_a_fit_begins_near_the_softness_that_the_body_has(tmp_path, leap):
     candidate = Candidate(Form(COMPLIANCE))
     flexibility = leap * candidate.sizes[0].typical

@@ -18,6 +18,7 @@ from srs_opt.discrepancy.describe import describe_gap, terms_of
 from srs_opt.discrepancy.locate import stages
 from srs_opt.discrepancy.pipeline import diagnose
 from srs_opt.discrepancy.search import Search
+from srs_opt.discrepancy.settings import DESCRIPTION
 from srs_opt.discrepancy.split import split_trials
 from srs_opt.effects import all_effects, generic_effects
 from srs_opt.measurement.dataset import load_dataset
@@ -87,7 +88,7 @@ def test_terms_stand_at_every_place_but_where_the_robot_has_them():
     labels = {c.label for c in terms_of(5, ["generic_along_link[2]"])}
     assert {"generic_along_link[1]", "generic_gain_segment[4]", "generic_moment"} <= labels
     assert not {"generic_along_link[2]", "generic_gain_segment[5]"} & labels
-    assert describe.DEFAULT.refits < len(labels)
+    assert DESCRIPTION.refits < len(labels)
 
 
 def fitted(misfit, *candidates):

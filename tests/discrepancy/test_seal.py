@@ -32,7 +32,10 @@ def opened(monkeypatch, before_m, after_m, trials=3, seed=0):
     noise = [SD * rng.standard_normal((480, 10)) for _ in named]
     sizes = {"before": before_m, "after": after_m}
     monkeypatch.setattr(seal, "sealed_residuals", lambda e, fit, ts: [n + sizes[fit] * wave for n in noise])
-    return seal.open_seal(SimpleNamespace(noise=Noise(SD)), "before", "after", named)
+    experiment = SimpleNamespace(
+        noise=Noise(SD), model=SimpleNamespace(robot=SimpleNamespace(length_m=0.236))
+    )
+    return seal.open_seal(experiment, "before", "after", named)
 
 
 def test_the_floor_is_the_noise_whatever_misfit_is_left(monkeypatch):
@@ -77,10 +80,10 @@ def test_errors_of_speed_and_radius_are_those_of_a_circle():
     time_s = np.arange(480) / 120
     trial = Trial("t", 1.5, 41.0, 0.0, 1.57, 0.0, 4.0, time_s, steady(time_s))
     slower = (trial.markers_m - steady(time_s, 0.098, 0.4)).reshape(480, -1)
-    speed, radius = motion_errors([trial], [slower])
+    speed, radius = motion_errors([trial], [slower], 0.236)
     assert speed == pytest.approx(0.02, rel=1e-3) and radius == pytest.approx(0.02, rel=1e-3)
     straighter = (trial.markers_m - steady(time_s, 0.1, 0.38)).reshape(480, -1)
-    speed, radius = motion_errors([trial], [straighter])
+    speed, radius = motion_errors([trial], [straighter], 0.236)
     assert speed < 0.002 and radius == pytest.approx(0.4 / 0.38 - 1, rel=0.05)
 
 

@@ -8,11 +8,12 @@ from srs_opt.calibrate.candidates import all_candidates
 from srs_opt.calibrate.trials import Point
 from srs_opt.discrepancy.answer import _fate
 from srs_opt.discrepancy.screen import Score
-from srs_opt.discrepancy.search import NEARER, Search
+from srs_opt.discrepancy.search import Search
+from srs_opt.discrepancy.search_settings import SEARCH
 
 
 @pytest.mark.parametrize(
-    ("deviance", "starts", "best"), [(900.0, [1.0], 900.0), (2000.0, [1.0, NEARER], 500.0)]
+    ("deviance", "starts", "best"), [(900.0, [1.0], 900.0), (2000.0, [1.0, SEARCH.restart_share], 500.0)]
 )
 def test_a_refit_that_ends_worse_than_without_its_effect_begins_again_nearer(deviance, starts, best):
     """The model without the effect is the one with size zero, so no converged fit can be worse."""

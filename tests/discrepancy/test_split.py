@@ -2,7 +2,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from srs_opt.discrepancy.split import BRIEF_S, FEW, few_and_brief, gait_of, split_trials
+from srs_opt.discrepancy.search_settings import SPLIT
+from srs_opt.discrepancy.split import few_and_brief, gait_of, split_trials
 from srs_opt.measurement.records import Trial
 from virtual_lab.trials import small_design
 
@@ -83,7 +84,7 @@ def test_too_few_trials_are_not_enough():
 def test_the_first_seconds_of_a_few_trials_have_names_of_their_own():
     many = trials(12, 400)
     some = few_and_brief(many)
-    assert len(some) == FEW
-    assert all(t.time_s[-1] <= BRIEF_S and t.markers_m.shape[0] == t.time_s.size for t in some)
+    assert len(some) == SPLIT.brief_trials
+    assert all(t.time_s[-1] <= SPLIT.brief_s and t.markers_m.shape[0] == t.time_s.size for t in some)
     assert not {t.name for t in some} & {t.name for t in many}
     assert few_and_brief(trials(5)) == ()  # would save nothing

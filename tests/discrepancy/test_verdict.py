@@ -8,7 +8,7 @@ import pytest
 from srs_opt.discrepancy.design import proposals, repeat_of
 from srs_opt.discrepancy.functions import Group
 from srs_opt.discrepancy.seal import Gap, Remainder
-from srs_opt.discrepancy.settings import SETTINGS
+from srs_opt.discrepancy.settings import ADEQUACY
 from srs_opt.discrepancy.verdict import judge
 from srs_opt.measurement.records import Trial
 
@@ -63,7 +63,7 @@ def test_lengths_are_those_of_the_body():
     """What costs a short robot's name does not cost that of one four times as long."""
     left = gap(40e-3, 2e-3)
     words = [
-        judge(diagnostics(1e-9, 80.0), diagnostics(1e-9, 1.05), chosen("a"), left, SETTINGS.of_body(m)).word
+        judge(diagnostics(1e-9, 80.0), diagnostics(1e-9, 1.05), chosen("a"), left, ADEQUACY.of_body(m)).word
         for m in (0.236, 1.0)
     ]
     assert words == ["unknown", "named"]
@@ -94,7 +94,7 @@ def test_sealed_trials_that_are_missed_are_a_gap_whatever_the_open_ones_say():
 def test_rivals_and_what_is_implausible_abstain():
     assert said(0.5, chosen("a", rivals=(("b",),)), gap(9e-3, 1e-5)).word == "one_of"
     assert said(0.5, chosen("a", implausible="too large"), gap(9e-3, 1e-5)).word == "unknown"
-    assert SETTINGS.small_m <= SETTINGS.left_m
+    assert ADEQUACY.small_m <= ADEQUACY.left_m
 
 
 def test_proposed_gaits_are_within_what_a_slow_robot_did():
