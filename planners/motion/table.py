@@ -18,6 +18,7 @@ from srs_opt.geometry import compose, points_in_room
 SAMPLES = 16  # intervals per cycle at which pose and body are kept
 
 Array = NDArray[np.float64]
+Numbers = NDArray[np.int64]
 
 
 class Motion(NamedTuple):
@@ -88,6 +89,11 @@ class MotionTable:
         """Return the row of what is played: itself for gaits and rest, of its gait for a plan's own cycle."""
         return number if number <= self.rest else self.origin[number - self.rest - 1]
 
+    @cached_property
+    def row_of(self) -> Numbers:
+        """Row of everything that is played, by its number; see `row`."""
+        return np.array([*range(self.rest + 1), *self.origin])
+
     def rows(self, numbers: Sequence[int]) -> tuple[int, ...]:
         """Return the gaits of cycles: of those made for one plan, what they have come from."""
         return tuple(self.row(number) for number in numbers)
@@ -118,21 +124,22 @@ class MotionTable:
         local, after = ((1 - weight) * t[:, low] + weight * t[:, low + 1] for t in tables)
         return Motion(compose(np.array([x, y, heading]), local), after)
 
-    def ends(self, start: Array, before: Sequence[int], speed_m_s: Sequence[float]) -> Motion:
+    def ends(
+        self, start: Array, before: Sequence[int] | Numbers, speed_m_s: Sequence[float] | Array
+    ) -> Motion:
         """Return where a cycle of each gait ends from several states.
 
         Parameters
         ----------
         start : array (n, 3)
-        before : sequence of int (n,)
-        speed_m_s : sequence of float (n,)
+        before, speed_m_s : array (n,)
 
         Returns
         -------
         Motion
             Pose (n, gaits, 3) and speed (n, gaits) at the ends.
         """
-        rows, low, weight = self._levels(before, speed_m_s)
+        rows, low, weight = self._levels(np.asarray(before), np.asarray(speed_m_s))
         local, after = (
             _between(t[rows, :, low], t[rows, :, low + 1], weight)
             for t in (self.pose[..., -1, :], self.speed_after_m_s)
@@ -140,10 +147,14 @@ class MotionTable:
         return Motion(compose(start[:, None], local), after.astype(np.float64))
 
     def poses(
-        self, start: Array, before: Sequence[int], speed_m_s: Sequence[float], now: NDArray[np.int64]
+        self,
+        start: Array,
+        before: Sequence[int] | Numbers,
+        speed_m_s: Sequence[float] | Array,
+        now: Numbers,
     ) -> Array:
         """Return the poses (n, SAMPLES + 1, 3) over cycles of gaits `now` (n,), each from its own state."""
-        rows, low, weight = self._levels(before, speed_m_s)
+        rows, low, weight = self._levels(np.asarray(before), np.asarray(speed_m_s))
         local = _between(self.pose[rows, now, low], self.pose[rows, now, low + 1], weight)
         return compose(start[:, None], local)
 
@@ -172,13 +183,16 @@ class MotionTable:
         weight = (speed_m_s - levels[low]) / (levels[low + 1] - levels[low])
         return low, float(min(max(weight, -0.5), 1.5))
 
-    def _levels(
-        self, before: Sequence[int], speed_m_s: Sequence[float]
-    ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float32]]:
+    def _levels(self, before: Numbers, speed_m_s: Array) -> tuple[Numbers, Numbers, NDArray[np.float32]]:
         """Return rows, levels below the speeds and the weights of the levels above, (n,) each."""
-        rows = self.rows(before)
-        low, weight = zip(*(self._level(row, speed) for row, speed in zip(rows, speed_m_s)))
-        return np.array(rows), np.array(low), np.array(weight, dtype=np.float32)
+        rows = self.row_of[before]
+        levels = self.speed_m_s[rows]
+        # as `_level`: the last level below each speed, and within the table
+        low = ((levels < speed_m_s[:, None]).sum(axis=1) - 1).clip(0, levels.shape[1] - 2)
+        each = np.arange(rows.size)
+        below = levels[each, low]
+        weight = (speed_m_s - below) / (levels[each, low + 1] - below)
+        return rows, low, weight.clip(-0.5, 1.5).astype(np.float32)
 
     def bodies(self, before: int, now: NDArray[np.int64] | slice, pose: Array) -> Array:
         """Return centre lines in the room, (gaits, SAMPLES + 1, points, 2), for poses of the same gaits."""

@@ -75,8 +75,8 @@ class _Begins(NamedTuple):
 
     node: list[int]
     pose: Array
-    before: list[int]
-    speed_m_s: list[float]
+    before: NDArray[np.int64]
+    speed_m_s: Array
 
 
 class BeamSearch:
@@ -136,13 +136,13 @@ class BeamSearch:
         begin = _Begins(
             nodes,
             np.array([tree.cycle[node].state[[X, Y, HEADING]] for node in nodes]),
-            [tree.gait[node] for node in nodes],
-            [float(tree.cycle[node].state[FORWARD]) for node in nodes],
+            np.array([tree.gait[node] for node in nodes]),
+            np.array([tree.cycle[node].state[FORWARD] for node in nodes]),
         )
         end, speed_m_s = motion.ends(begin.pose, begin.before, begin.speed_m_s)
         left = cost_to_go(problem, end, speed_m_s, s.by_heading)
         orders = []
-        for mine, before in zip(left, begin.before):
+        for mine, before in zip(left, begin.before.tolist()):
             order = np.argsort(mine + motion.period_s, kind="stable")
             orders.append(order[(mine[order] < BLOCKED_S / 2) & motion.may_follow(before)[order]])
         found = self._fitting(begin, list(range(len(nodes))), [order[:FIRST_LOOK] for order in orders], left)
@@ -160,17 +160,18 @@ class BeamSearch:
         problem, s, motion = self.problem, self.settings, self.problem.motion
         owner = np.repeat(np.arange(len(which)), [len(mine) for mine in gaits])
         state, now = np.array(which)[owner], np.concatenate(gaits)
-        before = [begin.before[k] for k in state]
-        pose = motion.poses(begin.pose[state], before, [begin.speed_m_s[k] for k in state], now)
+        before = begin.before[state]
+        pose = motion.poses(begin.pose[state], before, begin.speed_m_s[state], now)
         spare = problem.body.estimate(motion_lines(problem, before, pose, now)).min(axis=1) - problem.margin_m
         tight = np.clip(1 - spare / motion.body_width_m, 0.0, 1.0)
         spent = np.array([self._tree.spent[begin.node[k]] for k in which])[owner]
         spent = spent + problem.cost_model.of_cycles(now, pose, spare)
-        spent = spent + s.change_s * (now != np.array(before)) + s.air_s * tight
+        spent = spent + s.change_s * (now != before) + s.air_s * tight
         rank = spent + left[state, now]
-        for k in np.flatnonzero(spare > -problem.field.error_m):
-            node = begin.node[state[k]]
-            found[owner[k]].append(_Expansion(float(rank[k]), node, int(now[k]), float(spent[k])))
+        clear = np.flatnonzero(spare > -problem.field.error_m)
+        columns = (a[clear].tolist() for a in (owner, rank, state, now, spent))
+        for mine, r, k, gait, cost in zip(*columns):
+            found[mine].append(_Expansion(r, begin.node[k], gait, cost))
         return found
 
     def _chosen(self, expansions: list[_Expansion]) -> list[int]:

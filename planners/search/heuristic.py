@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -63,11 +61,10 @@ def _by_place(problem: Problem, end: Array) -> tuple[Array, Array]:
 
 
 def motion_lines(
-    problem: Problem, before: int | Sequence[int], pose: Array, gaits: NDArray[np.int64]
+    problem: Problem, before: int | NDArray[np.int64], pose: Array, gaits: NDArray[np.int64]
 ) -> Array:
     """Return thinned centre lines (n, samples, points, 2) of cycles of gaits (n,) after another or others.
 
     `pose` (n, SAMPLES + 1, 3) is over these cycles.
     """
-    rows = problem.motion.row(before) if isinstance(before, int) else np.array(problem.motion.rows(before))
-    return points_in_room(problem.motion.body[rows, gaits, 2::2, ::4], pose[:, 2::2])
+    return points_in_room(problem.motion.body[problem.motion.row_of[before], gaits, 2::2, ::4], pose[:, 2::2])
