@@ -25,7 +25,7 @@ from srs_opt.gait_opt.collocation.layout import Mesh
 from srs_opt.gait_opt.collocation.problem import CycleProblem
 from srs_opt.gait_opt.collocation.program import Program, Solution
 from srs_opt.gait_opt.score import Score, score
-from srs_opt.gait_opt.search_settings import CONTINUATION
+from srs_opt.gait_opt.search_settings import CONTINUATION, ContinuationSettings
 from srs_opt.gait_opt.settings import COLLOCATION
 from srs_opt.orbit.steady import Orbit, steady_gait
 from srs_opt.robot import Robot
@@ -105,31 +105,37 @@ Bounds = tuple[np.ndarray, np.ndarray]
 Report = Callable[[Step, Score], None]
 
 
-def continuation_stages(own_m_s: float, reach: float = 0.1, *, quick: bool = False) -> tuple[Stage, ...]:
-    """Return the stages from strongly smoothed friction to the robot's own `own_m_s`."""
+def continuation_stages(
+    own_m_s: float, *, quick: bool = False, settings: ContinuationSettings = CONTINUATION
+) -> tuple[Stage, ...]:
+    """Return the stages from strongly smoothed friction to the robot's own `own_m_s`.
+
+    The sharper the friction, the shorter the reach over which the linearized problem holds.
+    """
     if quick:
-        return _quick_stages(own_m_s, reach)
-    stages = [Stage(v, n, reach, 4) for v, n in ((0.1, 40), (0.03, 40), (0.01, 50)) if v > 1.5 * own_m_s]
-    stages += [Stage(0.004, 64, reach / 2, 2)] if own_m_s < 0.003 else []
-    stages += [Stage(v, 80, reach / 3, 2) for v in (0.002, 0.001, 0.0005) if v > 1.5 * own_m_s]
-    return (*stages, Stage(own_m_s, 80, reach / 3, 3))
+        return _quick_stages(own_m_s, settings)
+    s, least_m_s = settings, settings.least_ratio * own_m_s
+    stages = [Stage(v, n, s.reach, 4) for v, n in s.smooth_stages if v > least_m_s]
+    stages += [Stage(*s.middle_stage, s.reach / 2, 2)] if own_m_s < s.middle_below_m_s else []
+    stages += [Stage(v, s.sharp_elements, s.reach / 3, 2) for v in s.sharp_m_s if v > least_m_s]
+    return (*stages, Stage(own_m_s, s.sharp_elements, s.reach / 3, 3))
 
 
-def _quick_stages(own_m_s: float, reach: float) -> tuple[Stage, ...]:
+def _quick_stages(own_m_s: float, settings: ContinuationSettings) -> tuple[Stage, ...]:
     """Return stages on coarse meshes, down to twice the robot's own smoothing or to that itself.
 
     From there the exact switch times are the better next step: they need a fine mesh only once.
     """
-    speeds = [v for v in (0.1, 0.03, 0.01, 0.004, 0.002, 0.001) if v > 1.5 * own_m_s]
+    speeds = [v for v in settings.quick_m_s if v > settings.least_ratio * own_m_s]
     if not speeds or speeds[-1] > 2 * own_m_s:
         speeds.append(own_m_s)
     stages = []
     for v in speeds:
         elements = next(
-            (n for least, n in CONTINUATION.quick_elements if v >= least), CONTINUATION.finest_quick_elements
+            (n for least, n in settings.quick_elements if v >= least), settings.finest_quick_elements
         )
-        stiff = v < 0.01
-        stages.append(Stage(v, elements, reach / 2 if stiff else reach, 2 if stiff else 4, quick=True))
+        reach, repeats = (settings.reach, 4) if v >= settings.quick_smooth_m_s else (settings.reach / 2, 2)
+        stages.append(Stage(v, elements, reach, repeats, quick=True))
     return tuple(stages)
 
 

@@ -19,10 +19,29 @@ class ContinuationSettings:
         smaller ones take more solves.
     pressure_reach : float
         The same of the pressure, in units of 50 kPa.
+    reach : float
+        Cycles that the switches may move in one solve while the friction is smooth.
+    smooth_stages : tuple of (float, int)
+        Smoothing speeds (m/s) with the elements of their meshes. The smoother, the fewer optima there are
+        and the farther they lie from those of the robot's own friction.
+    middle_stage : (float, int)
+        Between these and the sharp ones, for robots whose own friction is sharper than `middle_below_m_s`.
+    middle_below_m_s : float
+    sharp_m_s : tuple of float
+        The stages after them. Larger ratios of neighbours: starts are poor, and solves fail; smaller ones:
+        more solves.
+    sharp_elements : int
+        Of their meshes: friction that nearly sticks changes within a small part of the cycle.
+    least_ratio : float
+        A stage is left out where it is smoothed by less than this over the robot's own.
+    quick_m_s : tuple of float
+        Stages of a quick search, which ends at twice the robot's own smoothing or at that itself.
     quick_elements : tuple of (float, int)
         Smoothing speed (m/s) down to which a quick stage's mesh has so many elements.
     finest_quick_elements : int
         Elements below the last of these.
+    quick_smooth_m_s : float
+        Down to which quick stages have the full reach.
     uniform_share : float
         Of the mesh; the rest follows the simulation's steps. 1 ignores where the motion is stiff, 0 leaves
         few elements for what moves away from there.
@@ -32,6 +51,15 @@ class ContinuationSettings:
 
     frequency_reach_hz: float = 3.0
     pressure_reach: float = 4.0
+    reach: float = 0.1
+    smooth_stages: tuple[tuple[float, int], ...] = ((0.1, 40), (0.03, 40), (0.01, 50))
+    middle_stage: tuple[float, int] = (0.004, 64)
+    middle_below_m_s: float = 0.003
+    sharp_m_s: tuple[float, ...] = (0.002, 0.001, 0.0005)
+    sharp_elements: int = 80
+    least_ratio: float = 1.5
+    quick_m_s: tuple[float, ...] = (0.1, 0.03, 0.01, 0.004, 0.002, 0.001)
+    quick_smooth_m_s: float = 0.01
     quick_elements: tuple[tuple[float, int], ...] = ((0.1, 24), (0.03, 28), (0.01, 36), (0.004, 50))
     finest_quick_elements: int = 60
     uniform_share: float = 0.5
