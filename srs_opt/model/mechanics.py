@@ -230,6 +230,7 @@ class Mechanics(ABC):
         u_x, u_y = velocity[0], velocity[1]
         yaw_rate = self.yaw_rate(velocity[2])
         f = self.forces(pose, u_x, u_y, yaw_rate)
+        # u = R(-psi) p', so u' = R(-psi) p'' - psi' e_z x u
         per_mass = 1 / self.total_mass()
         rate = ca.vertcat(
             ca.sum1(f.x) * per_mass + yaw_rate * u_y,

@@ -20,6 +20,7 @@ class SimplifiedModel(Mechanics):
 
     def _link_inertia(self) -> ca.SX:
         """Return j(i) of (4), (N, 1): a third of m l^2 for every arc that ends at the link."""
+        # the arms are those of (3)
         arms2 = chord_length(self.kappa, self.length) ** 2
         zero = ca.SX(0)
         return self.mass / 3 * (ca.vertcat(zero, arms2) + ca.vertcat(arms2, zero))
@@ -34,6 +35,7 @@ class SimplifiedModel(Mechanics):
 
     def yaw_momentum_rate(self, forces: Forces, yaw_rate: ca.SX) -> ca.SX:
         """Return the neighbours' moments plus sum j'(i) theta_i' (the momentum's j varies with the bend)."""
+        # the friction terms of (12), summed over the links: neighbours' forces at the arms between them
         x, y = self.chain.x, self.chain.y
         moment = ca.SX(0)
         for i in range(self.links):

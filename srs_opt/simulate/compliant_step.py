@@ -100,6 +100,7 @@ def _stages(
         return Drive(at.kappa, at.dkappa, pose, actuator.rates(at, valve).dkappa, at.time_s)
 
     start = drive(act)
+    # g = force - M Y'': at Y'' = 0 it is the right-hand side of M Y'' = force
     force, power = chain.residual(y, dy, zero, start, ca.SX(1))
     acceleration = mass_matrix(chain, y, start).solver()(force)
     jacobian = derivatives(chain, y, dy, acceleration, start)
@@ -109,7 +110,7 @@ def _stages(
     solve = jacobian.mass.plus(jacobian.by_rate, -step).plus(jacobian.by_place, -(step**2)).solver()
     k: list[_Increment] = []
     last: tuple[float, ...] = (*STAGES[4], 1.0)
-    for i in range(6):
+    for i in range(6):  # as in `rosenbrock.step_function`, places and accelerations eliminated
         weights = STAGES[i] if i < 5 else last
         at = _combined(weights, k, n)
         if i:

@@ -53,6 +53,7 @@ def cycle_motion(
     period = time_s[-1]
     displacement = pose[-1] - pose[0]
     dx, dy, turn = displacement
+    # means over the cycle, by the trapezoidal rule: the nodes are not evenly spaced
     weights = np.gradient(time_s)
     weights[[0, -1]] = (time_s[1] - time_s[0]) / 2, (time_s[-1] - time_s[-2]) / 2
     weights /= weights.sum()
@@ -97,6 +98,7 @@ def largest(values: np.ndarray) -> float:
     cycle = values[:, :-1]
     row, k, count = np.arange(len(cycle)), cycle.argmax(axis=1), cycle.shape[1]
     before, peak, after = (cycle[row, (k + d) % count] for d in (-1, 0, 1))
+    # the vertex of a parabola through three samples a step apart
     second = 2 * peak - before - after
     rise = np.divide((after - before) ** 2, 8 * second, out=np.zeros(len(cycle)), where=second > 0)
     return float((peak + rise).max())

@@ -98,13 +98,9 @@ def _divided(h_s: np.ndarray, phase: np.ndarray, density: np.ndarray, least: int
 
 def _density(error: np.ndarray, tolerance: float) -> np.ndarray:
     """Return by how many new steps each old one is to be replaced."""
-    return _smoothed(
-        np.clip(
-            (np.maximum(error, 1e-30) / tolerance) ** (1 / ORDER),
-            1 / STEP.largest_change,
-            STEP.largest_change,
-        )
-    )
+    # a step errs as h^4: (error/tolerance)^(1/4) shorter ones in its place err by the tolerance each
+    wanted = (np.maximum(error, 1e-30) / tolerance) ** (1 / ORDER)
+    return _smoothed(np.clip(wanted, 1 / STEP.largest_change, STEP.largest_change))
 
 
 def _smoothed(density: np.ndarray) -> np.ndarray:

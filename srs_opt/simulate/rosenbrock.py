@@ -102,9 +102,11 @@ def step_function(structure: Structure) -> ca.Function:
     k: list[ca.SX] = []
     y = body
     for i in range(6):
+        # (I/gamma - h J) k_i = h f(y_i) + h^2 g_i df/dt + sum_j c_ij k_j: the transformed form, in which no
+        # stage multiplies by J
         if i < 5:
             y = body + sum((a * kj for a, kj in zip(STAGES[i], k)), ca.SX.zeros(BODY_STATES, 1))
-        else:
+        else:  # the embedded third-order result; its difference to the fourth-order one is k_6 itself
             y = y + k[4]
         shape = shapes[NODES[i]]
         r = h * field.value(y[POSE], y[VELOCITY], shape.kappa, shape.dkappa, shape.time_s, p)
@@ -119,6 +121,7 @@ def step_function(structure: Structure) -> ca.Function:
         turn_rate_error = parameters["segment_length_m"] * (half.dkappa - last.dkappa)
         shape_error, last = ca.sumsqr(LEVER_M * turn_rate_error), half
     spin_error = LEVER_M * k[5][5] / inertia
+    # 1e-30 keeps the root differentiable where nothing moves
     error = ca.sqrt(k[5][3] ** 2 + k[5][4] ** 2 + spin_error**2 + shape_error + 1e-30)
     return ca.Function(
         "step",

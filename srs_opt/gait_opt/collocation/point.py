@@ -216,6 +216,7 @@ def _lateral_reach(m: Mechanics, heading: ca.SX, ahead: ca.SX, aside: ca.SX, cur
         chord = ca.vertcat(chain.x[i + 1] - chain.x[i], chain.y[i + 1] - chain.y[i])
         sagitta = segment_sagitta(m.kappa[i], length[i], m.gap_length, m.gap_ratio)
         norm = ca.sqrt(ca.dot(chord, chord))
+        # the arc's middle lies right of the chord's by the sagitta (kappa > 0: bent to the left)
         xs.append((chain.x[i] + chain.x[i + 1]) / 2 + sagitta * chord[1] / norm)
         ys.append((chain.y[i] + chain.y[i + 1]) / 2 - sagitta * chord[0] / norm)
     x, y = ca.vertcat(*xs), ca.vertcat(*ys)
