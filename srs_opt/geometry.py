@@ -41,6 +41,16 @@ def rotation_matrix(angle: float) -> np.ndarray:
     return np.array([[c, -s], [s, c]])
 
 
+def unit_vectors(angle: np.ndarray) -> Array:
+    """Return the unit vectors (..., 2) along angles (...), rad."""
+    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+
+
+def quarter_turn(vectors: np.ndarray) -> Array:
+    """Turn vectors (..., 2) by 90 degrees to the left: the derivative of `unit_vectors` by the angle."""
+    return np.stack([-vectors[..., 1], vectors[..., 0]], axis=-1)
+
+
 def compose(frame: np.ndarray, local: np.ndarray) -> Array:
     """Return poses (..., 3) in the room that are `local` in a frame with pose (3,), or in several of them."""
     x, y = rotate(frame[..., 2], local[..., 0], local[..., 1])

@@ -11,6 +11,7 @@ import numpy as np
 from srs_opt.calibrate.noise import Noise
 from srs_opt.calibrate.observe import Prediction
 from srs_opt.calibrate.slow import Amplitudes
+from srs_opt.geometry import quarter_turn, unit_vectors
 from srs_opt.measurement.records import Trial
 
 
@@ -141,8 +142,8 @@ def _patterns(
     points: np.ndarray, heading: np.ndarray, parts: tuple[tuple[str, int], ...]
 ) -> list[list[np.ndarray]]:
     """Return displacement patterns of the markers, (T, 2 M) each, by part of the motion."""
-    along = np.stack([np.cos(heading), np.sin(heading)], axis=1)[:, None, :]
-    across = np.stack([-np.sin(heading), np.cos(heading)], axis=1)[:, None, :]
+    along = unit_vectors(heading)[:, None, :]
+    across = quarter_turn(along)
     count = points.shape[1]
     place = np.linspace(-1, 1, count) if count > 1 else np.zeros(1)
 

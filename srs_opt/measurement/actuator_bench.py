@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from srs_opt.errors import InputError
+from srs_opt.measurement.fit_settings import STEP_TEST
 from srs_opt.measurement.records import CONDITIONS, Array
 from srs_opt.measurement.steps import StepFit, time_constants
-
-NOT_PROPORTIONAL = 0.01  # probability of the trend below which C0 is given as a curve over pressure
 
 
 @dataclass(frozen=True)
@@ -60,7 +59,7 @@ class CurvatureOverPressure:
         Probability of a trend of C0/pressure with pressure at least this strong if C0 were proportional to
         pressure; None with fewer than three tests or a single pressure. Small: not proportional.
     curve : tuple of CurveValue
-        C0 at every pressure, where it is not proportional (`NOT_PROPORTIONAL`); else empty.
+        C0 at every pressure, where it is not proportional (`StepTestSettings.trend_level`); else empty.
     """
 
     condition: str
@@ -136,7 +135,7 @@ def _curvature(condition: str, fits: list[StepFit]) -> CurvatureOverPressure:
         p_value = float(line.pvalue) if np.isfinite(line.pvalue) else None
     sds = np.maximum(sds, 1e-12)
     curve: tuple[CurveValue, ...] = ()
-    if p_value is not None and p_value < NOT_PROPORTIONAL:
+    if p_value is not None and p_value < STEP_TEST.trend_level:
         groups = [(p, pressure == p) for p in sorted(set(pressure.tolist()))]
         means = [(p, weighted_mean(slopes[own], sds[own])) for p, own in groups]
         curve = tuple(CurveValue(p, p * m.value, p * m.sd) for p, m in means)

@@ -14,14 +14,13 @@ from srs_opt.measurement.actuator_bench import combine_steps
 from srs_opt.measurement.bench_files import MAP_COLUMNS
 from srs_opt.measurement.bending import BendingFit, bench_robot, fit_bending
 from srs_opt.measurement.checks import compare_checks
+from srs_opt.measurement.fit_settings import BENDING
 from srs_opt.measurement.motion import Motion, motion_map, trial_motion
 from srs_opt.measurement.records import DataSet
 from srs_opt.measurement.spring_car import breakaway_friction
 from srs_opt.measurement.steps import fit_steps
 from srs_opt.measurement.tow import analyse_tow
 from srs_opt.robot import save_robot
-
-DOUBTFUL = 2.0  # times the expected squared residuals of the steps on the ground
 
 
 def analyse(dataset: DataSet) -> dict[str, Any]:
@@ -148,7 +147,7 @@ def _bending_words(bending: BendingFit) -> str:
     else:
         words = f"bending stiffness {bending.stiffness_n_m2:.4g} N m^2 ± {100 * bending.relative_sd:.1f} %"
     words += f" ({bending.pairs} steps on the ground against their lifted twins)"
-    if bending.misfit > DOUBTFUL:
+    if bending.misfit > BENDING.doubtful_misfit:
         words += f"; these differ by more than friction explains (misfit {bending.misfit:.1f})"
     return words
 

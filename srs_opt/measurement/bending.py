@@ -9,7 +9,7 @@ nuisance parameters with the deviations that they are known to.
 A ground that takes a share of every bend and slows every step alike, whatever the pressure, is something
 else: curves that lifted ones on another scale explain better get no stiffness (`BendingFit.scaled`).
 
-Friction is dry here: smoothed with the robot's own speed the loss would creep away within a second or two.
+Friction is dry here: smoothed with the robot's own speed the loss would relax within a second or two.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ import numpy as np
 from srs_opt.effects import known_effects
 from srs_opt.errors import NoAnswerError
 from srs_opt.measurement.actuator_bench import ActuatorBench, combine_steps
+from srs_opt.measurement.fit_settings import BENDING
 from srs_opt.measurement.records import Array, StepTest
 from srs_opt.measurement.steps import StepFit, fit_steps
 from srs_opt.model.actuator_law import step_response
@@ -30,16 +31,7 @@ from srs_opt.simulate.batched import run_batched
 from srs_opt.simulate.integrate import Integrator
 from srs_opt.simulate.timeline import Timeline
 
-# a tenth changes the loss of bend by 0.1 % of itself and doubles the time, ten times as much loses 3 %
-FRICTION_SPEED_M_S = 3e-5
-TOLERANCE_M_S = FRICTION_SPEED_M_S / 10
-STARTS = (5.0, 50.0, 200.0, 500.0)  # 1/(N m^2): EI from 0.2 down to 0.002
-LEAST = 0.02  # 1/(N m^2); an EI of 50 is rigid for any snake
-ITERATIONS, SETTLED = 12, 1e-3
-DETECTED_SD = 2.0
-# of twice the log likelihood: how much better another scale has to explain the tests than a bending moment
-SCALED = 10.0
-NO_RHYTHM_HZ = 1e-9  # a single step has no frequency for the supply to droop with
+SINGLE_STEP_HZ = 1e-9  # a single step has no frequency for the supply to droop with
 
 
 @dataclass(frozen=True)
@@ -144,7 +136,7 @@ class _Problem:
     def __init__(self, robot: Robot, pairs: list[_Pair], known: Array, sds: Array) -> None:
         delays = [e for e in robot.effects if known_effects()[e["name"]].delay is not None]
         self.robot = robot.with_values(
-            friction_speed_m_s=FRICTION_SPEED_M_S,
+            friction_speed_m_s=BENDING.friction_speed_m_s,
             valve_delay_s=0.0,
             gap_stiffness_n_m2=None,
             effects=[dict(e) for e in robot.effects if e not in delays],
@@ -162,7 +154,10 @@ class _Problem:
         here = np.concatenate([[flexibility], nuisance])
         # large enough for the integration's error, which is 1e-6 of the bend
         steps = np.array([max(2e-3 * flexibility, 0.5), *(1e-3 * np.maximum(np.abs(nuisance), 0.05))])
-        ends = here + steps, np.maximum(here - steps, [LEAST, *np.full(nuisance.size, -np.inf)])
+        ends = (
+            here + steps,
+            np.maximum(here - steps, [BENDING.least_1_n_m2, *np.full(nuisance.size, -np.inf)]),
+        )
         wanted, places = [], []
         for k in range(count):
             for i in (0, 1, 2, 3, 4 + k):
@@ -200,8 +195,8 @@ class _Problem:
             valve = np.zeros((robot.segments, 1))
             valve[(test.segment or 1) - 1] = 1.0
             end = np.array([max(float(test.time_s[-1]), 0.05)])
-            timeline = Timeline.constant(end, valve, test.pressure_kpa, NO_RHYTHM_HZ)
-            searches.append(run.travel(timeline, run.rest(), TOLERANCE_M_S))
+            timeline = Timeline.constant(end, valve, test.pressure_kpa, SINGLE_STEP_HZ)
+            searches.append(run.travel(timeline, run.rest(), BENDING.tolerance_m_s))
         curves = []
         for (k, _, _), path in zip(wanted, run_batched(searches)):
             if isinstance(path, NoAnswerError):
@@ -215,14 +210,14 @@ class _Problem:
 def _fit(problem: _Problem) -> BendingFit:
     """Gauss-Newton with step halving, from the best of several stiffnesses."""
     nuisance = problem.known.copy()
-    costs = [float(np.sum(problem.residuals(f, nuisance) ** 2)) for f in STARTS]
-    flexibility, cost = STARTS[int(np.argmin(costs))], min(costs)
+    costs = [float(np.sum(problem.residuals(f, nuisance) ** 2)) for f in BENDING.starts_1_n_m2]
+    flexibility, cost = BENDING.starts_1_n_m2[int(np.argmin(costs))], min(costs)
     residual = problem.residuals(flexibility, nuisance)
-    for _ in range(ITERATIONS):
+    for _ in range(BENDING.iterations):
         jacobian = problem.jacobian(flexibility, nuisance)
         step = -np.linalg.lstsq(jacobian, residual, rcond=None)[0]
         for factor in (1.0, 0.5, 0.25, 0.1):
-            trial = max(flexibility + factor * float(step[0]), LEAST)
+            trial = max(flexibility + factor * float(step[0]), BENDING.least_1_n_m2)
             there = nuisance + factor * step[1:]
             found = problem.residuals(trial, there)
             if np.sum(found**2) <= cost * (1 + 1e-9):
@@ -231,15 +226,15 @@ def _fit(problem: _Problem) -> BendingFit:
             break
         moved = abs(trial - flexibility)
         flexibility, nuisance, residual, cost = trial, there, found, float(np.sum(found**2))
-        if moved < SETTLED * max(flexibility, 1.0):
+        if moved < BENDING.settled_share * max(flexibility, 1.0):
             break
     jacobian = problem.jacobian(flexibility, nuisance)
     readings = residual.size - nuisance.size
     misfit = cost / max(readings - 1, 1)
     sd = float(np.sqrt(np.linalg.inv(jacobian.T @ jacobian)[0, 0] * max(misfit, 1.0)))
     alike, scales = _scaled(problem)
-    scaled = scales if alike < cost - SCALED else None
-    detected = flexibility > DETECTED_SD * sd and scaled is None
+    scaled = scales if alike < cost - BENDING.scaled_gain else None
+    detected = flexibility > BENDING.detected_sd * sd and scaled is None
     return BendingFit(
         flexibility_1_n_m2=flexibility,
         flexibility_sd_1_n_m2=sd,

@@ -12,6 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
+from srs_opt.geometry import quarter_turn, unit_vectors
 from srs_opt.measurement.records import Array
 from srs_opt.measurement.spots import Spots, one_per_link
 from srs_opt.robot import Robot
@@ -70,20 +71,12 @@ def chain_of(robot: Robot, spots: Spots | None = None) -> Chain:
 
 
 def _sinc(h: Array) -> tuple[Array, Array]:
-    """Return S(h) = sin(h)/h and S'(h), by their series near 0."""
+    """Return S(h) = sin(h)/h and S'(h), by their series near 0, where the next terms are below 1e-10."""
     small = np.abs(h) < 1e-3
     safe = np.where(small, 1.0, h)
     value = np.where(small, 1 - h**2 / 6, np.sin(safe) / safe)
-    slope = np.where(small, -h / 3, (np.cos(safe) - value) / safe)
-    return value, slope
-
-
-def _unit(angle: Array) -> Array:
-    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-
-
-def _quarter_turn(vectors: Array) -> Array:
-    return np.stack([-vectors[..., 1], vectors[..., 0]], axis=-1)
+    derivative = np.where(small, -h / 3, (np.cos(safe) - value) / safe)
+    return value, derivative
 
 
 def headings(chain: Chain, q: Array) -> Array:
@@ -99,8 +92,8 @@ def link_positions(chain: Chain, q: Array) -> Array:
     theta = headings(chain, q)
     middle = (theta[..., :-1] + theta[..., 1:]) / 2
     length, _ = _sinc(chain.segment_length_m * q[..., 3:] / 2)
-    gaps = chain.gap_length_m / 2 * (_unit(theta[..., :-1]) + _unit(theta[..., 1:]))
-    steps = gaps + chain.segment_length_m * length[..., None] * _unit(middle)
+    gaps = chain.gap_length_m / 2 * (unit_vectors(theta[..., :-1]) + unit_vectors(theta[..., 1:]))
+    steps = gaps + chain.segment_length_m * length[..., None] * unit_vectors(middle)
     relative = np.concatenate([np.zeros((*steps.shape[:-2], 1, 2)), np.cumsum(steps, axis=-2)], axis=-2)
     points_m: Array = q[..., None, :2] + relative - relative.mean(axis=-2, keepdims=True)
     return points_m
@@ -110,28 +103,28 @@ def position_jacobian(chain: Chain, q: Array) -> Array:
     """Return the derivative of `link_positions`, shape (..., N, 2, N + 2)."""
     n, l = chain.links, chain.segment_length_m
     theta = headings(chain, q)
-    heading_slopes = _heading_slopes(chain)  # (N, N - 1): d theta_i / d kappa_j
+    heading_derivatives = _heading_derivatives(chain)  # (N, N - 1): d theta_i / d kappa_j
     middle = (theta[..., :-1] + theta[..., 1:]) / 2
-    length, slope = _sinc(l * q[..., 3:] / 2)
-    turned = _quarter_turn(_unit(theta)) * chain.gap_length_m / 2
-    arc = l * length[..., None] * _quarter_turn(_unit(middle))
+    length, derivative = _sinc(l * q[..., 3:] / 2)
+    turned = quarter_turn(unit_vectors(theta)) * chain.gap_length_m / 2
+    arc = l * length[..., None] * quarter_turn(unit_vectors(middle))
     steps = (
-        turned[..., :-1, :, None] * heading_slopes[:-1, None, :]
-        + turned[..., 1:, :, None] * heading_slopes[1:, None, :]
-        + arc[..., None] * ((heading_slopes[:-1] + heading_slopes[1:]) / 2)[:, None, :]
+        turned[..., :-1, :, None] * heading_derivatives[:-1, None, :]
+        + turned[..., 1:, :, None] * heading_derivatives[1:, None, :]
+        + arc[..., None] * ((heading_derivatives[:-1] + heading_derivatives[1:]) / 2)[:, None, :]
     )  # (..., N - 1, 2, N - 1): d step_i / d kappa_j
     own = np.arange(n - 1)
-    steps[..., own, :, own] += np.moveaxis((l * l / 2 * slope)[..., None] * _unit(middle), -2, 0)
+    steps[..., own, :, own] += np.moveaxis((l * l / 2 * derivative)[..., None] * unit_vectors(middle), -2, 0)
     tail = np.zeros((*steps.shape[:-3], 1, 2, n - 1))
     relative = np.concatenate([tail, np.cumsum(steps, axis=-3)], axis=-3)
     out = np.empty((*q.shape[:-1], n, 2, n + 2))
     out[..., :2] = np.eye(2)
-    out[..., 2] = _quarter_turn(link_positions(chain, q) - q[..., None, :2])
+    out[..., 2] = quarter_turn(link_positions(chain, q) - q[..., None, :2])
     out[..., 3:] = relative - relative.mean(axis=-3, keepdims=True)
     return out
 
 
-def _heading_slopes(chain: Chain) -> Array:
+def _heading_derivatives(chain: Chain) -> Array:
     below = np.tril(np.ones((chain.links, chain.links - 1)), -1) * chain.segment_length_m
     return np.asarray(below - below.mean(axis=0))
 
@@ -168,9 +161,9 @@ def marker_positions(chain: Chain, q: Array) -> Array:
     carrier, straight, way, left = _along(chain)
     theta, kappa = _carried(chain, q)
     chord, _ = _sinc(way * kappa / 2)
-    arc = (way * chord)[..., None] * _unit(theta + way * kappa / 2)
-    side = left[:, None] * _quarter_turn(_unit(theta + way * kappa))
-    return np.asarray(links[..., carrier, :] + straight[:, None] * _unit(theta) + arc + side)
+    arc = (way * chord)[..., None] * unit_vectors(theta + way * kappa / 2)
+    side = left[:, None] * quarter_turn(unit_vectors(theta + way * kappa))
+    return np.asarray(links[..., carrier, :] + straight[:, None] * unit_vectors(theta) + arc + side)
 
 
 def marker_jacobian(chain: Chain, q: Array) -> Array:
@@ -180,16 +173,16 @@ def marker_jacobian(chain: Chain, q: Array) -> Array:
         return links
     carrier, straight, way, left = _along(chain)
     theta, kappa = _carried(chain, q)
-    chord, slope = _sinc(way * kappa / 2)
+    chord, derivative = _sinc(way * kappa / 2)
     turn = np.zeros((chain.markers, chain.unknowns))  # d theta of the carrier
-    turn[:, 2], turn[:, 3:] = 1.0, _heading_slopes(chain)[carrier]
-    bend = np.zeros_like(turn)  # d (way * kappa): the turn along the chamber
+    turn[:, 2], turn[:, 3:] = 1.0, _heading_derivatives(chain)[carrier]
+    turn_along = np.zeros_like(turn)  # d (way * kappa): the turn along the chamber
     inside = carrier < chain.links - 1
-    bend[inside, 3 + carrier[inside]] = way[inside]
+    turn_along[inside, 3 + carrier[inside]] = way[inside]
     out = links[..., carrier, :, :].copy()
-    out += (straight[:, None] * _quarter_turn(_unit(theta)))[..., None] * turn[:, None, :]
-    middle = _unit(theta + way * kappa / 2)
-    out += ((way * chord)[..., None] * _quarter_turn(middle))[..., None] * (turn + bend / 2)[:, None, :]
-    out += ((way * slope / 2)[..., None] * middle)[..., None] * bend[:, None, :]
-    out -= (left[:, None] * _unit(theta + way * kappa))[..., None] * (turn + bend)[:, None, :]
+    out += (straight[:, None] * quarter_turn(unit_vectors(theta)))[..., None] * turn[:, None, :]
+    middle = unit_vectors(theta + way * kappa / 2)
+    out += ((way * chord)[..., None] * quarter_turn(middle))[..., None] * (turn + turn_along / 2)[:, None, :]
+    out += ((way * derivative / 2)[..., None] * middle)[..., None] * turn_along[:, None, :]
+    out -= (left[:, None] * unit_vectors(theta + way * kappa))[..., None] * (turn + turn_along)[:, None, :]
     return np.asarray(out)

@@ -12,13 +12,13 @@ from srs_opt.geometry import rotation_matrix, wrapped
 from srs_opt.measurement.chain import Chain
 from srs_opt.measurement.onset import Onset
 from srs_opt.measurement.records import Array, Trial
+from srs_opt.measurement.take_settings import IMPORT
 from srs_opt.measurement.takes.take import Take
 from srs_opt.measurement.valve_wave import ValveWave
 from srs_opt.problem import Report
 from srs_opt.table import Row
 
 SETTINGS = ("frequency_hz", "pressure_kpa", "offset", "phase_lag_rad")
-MOST_BENT_RAD = 0.15  # between neighbouring chords at the start; wheels stick, so a few degrees stay at rest
 
 
 def cut_trial(
@@ -83,7 +83,7 @@ def check_rest(trial: Trial, warnings: list[str]) -> None:
     chords = np.diff(points[:3], axis=1)
     angle = np.arctan2(chords[..., 1], chords[..., 0])
     bends = np.abs(wrapped(np.diff(angle, axis=1)))
-    if np.isfinite(bends).any() and float(np.nanmax(bends)) > MOST_BENT_RAD:
+    if np.isfinite(bends).any() and float(np.nanmax(bends)) > IMPORT.most_bent_rad:
         warnings.append(
             f"the robot is bent by {np.nanmax(bends):.2g} rad at the valves' start: the fits "
             "take it for straight and at rest then (if it was in mid-gait, give an earlier valve_start_s)"

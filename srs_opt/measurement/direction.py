@@ -11,10 +11,7 @@ from srs_opt.errors import InputError
 from srs_opt.measurement.chain import Chain
 from srs_opt.measurement.frequency import bends_of
 from srs_opt.measurement.records import Array
-
-CLEAR = 0.3  # of sin(lag): phases that differ by less in the mean do not tell
-FEWEST_CYCLES = 1.5
-LEFT = 0.6  # share of the bends that harmonics and noise may leave
+from srs_opt.measurement.take_settings import DIRECTION
 
 
 def head_first(
@@ -76,12 +73,12 @@ def _by_phase(time_s: Array, tracks: Array, frequency_hz: float, lag_rad: float)
     waves = []
     for bend in bends_of(tracks).T:
         seen = np.isfinite(bend)
-        if not seen.any() or np.ptp(time_s[seen]) * frequency_hz < FEWEST_CYCLES:
+        if not seen.any() or np.ptp(time_s[seen]) * frequency_hz < DIRECTION.least_cycles:
             return None
         wave = 2 * np.pi * frequency_hz * time_s[seen]
         basis = np.column_stack([np.sin(wave), np.cos(wave), np.ones_like(wave)])
         (a, b, mean), left = np.linalg.lstsq(basis, bend[seen], rcond=None)[:2]
-        if left.size and left[0] > LEFT * float(((bend[seen] - mean) ** 2).sum()):
+        if left.size and left[0] > DIRECTION.most_left * float(((bend[seen] - mean) ** 2).sum()):
             return None  # not the frequency of these bends
         waves.append(complex(a, b))
     steps = [w * np.conj(v) for v, w in pairwise(waves)]
@@ -89,7 +86,7 @@ def _by_phase(time_s: Array, tracks: Array, frequency_hz: float, lag_rad: float)
     if size <= 0:
         return None
     mean = sum(steps).imag / size
-    if abs(mean) < CLEAR * abs(math.sin(lag_rad)):
+    if abs(mean) < DIRECTION.least_lag * abs(math.sin(lag_rad)):
         return None
     return bool(mean * math.sin(lag_rad) < 0)
 

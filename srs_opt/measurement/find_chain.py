@@ -8,10 +8,7 @@ import numpy as np
 
 from srs_opt.measurement.chain import Chain
 from srs_opt.measurement.records import Array
-
-TOLERANCE = 0.25  # of the distance of two markers
-UNEVEN = 0.15  # of their mean: spacings that differ by more end to end tell which end is the tail
-MOST_PATHS = 200_000
+from srs_opt.measurement.take_settings import LABELS
 
 
 def find_chain(chain: Chain, positions: Array) -> np.ndarray | None:
@@ -27,10 +24,10 @@ def find_chain(chain: Chain, positions: Array) -> np.ndarray | None:
     """
     distance = np.linalg.norm(positions[:, None] - positions[None], axis=2)
     misfit = np.abs(np.nan_to_num(distance, nan=np.inf) / chain.spacing_m[:, None, None] - 1)
-    neighbours = [[np.flatnonzero(row < TOLERANCE) for row in each] for each in misfit]
+    neighbours = [[np.flatnonzero(row < LABELS.chain_tolerance) for row in each] for each in misfit]
     corners = _corners(chain.straight_m)
     best: tuple[float, tuple[int, ...]] = (np.inf, ())
-    budget = MOST_PATHS
+    budget = LABELS.most_paths
     stack: list[tuple[tuple[int, ...], float]] = [
         ((i,), 0.0) for i in range(len(positions)) if len(neighbours[0][i])
     ]
@@ -46,7 +43,7 @@ def find_chain(chain: Chain, positions: Array) -> np.ndarray | None:
         for j in neighbours[last][path[-1]]:
             if j not in path:
                 turn = _turn(positions, path, int(j), corners)
-                if turn < 1.6:  # a segment does not bend by more than about a right angle
+                if turn < LABELS.most_turn_rad:
                     stack.append(((*path, int(j)), cost + misfit[last, path[-1], j] + 0.05 * turn))
     return np.array(best[1]) if best[1] else None
 
@@ -54,7 +51,7 @@ def find_chain(chain: Chain, positions: Array) -> np.ndarray | None:
 def symmetric(chain: Chain) -> bool:
     """Whether the markers' spacing looks alike from both ends."""
     gap = np.abs(chain.spacing_m - chain.spacing_m[::-1])
-    return bool(gap.max() < UNEVEN * chain.spacing_m.mean())
+    return bool(gap.max() < LABELS.uneven_share * chain.spacing_m.mean())
 
 
 def _corners(row: Array) -> Array:

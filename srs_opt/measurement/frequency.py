@@ -8,12 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from srs_opt.measurement.records import Array
-
-HARMONICS = 3
-SEARCHED = 0.03  # share of the nominal frequency on either side
-FEWEST_CYCLES = 4.0
-SIGNIFICANT = 4.0  # standard deviations
-MATTERS = 0.01  # cycles over the whole take; less phase error is below what the tracks can show
+from srs_opt.measurement.take_settings import FREQUENCY
 
 
 @dataclass(frozen=True)
@@ -26,7 +21,7 @@ class SeenFrequency:
     def differs(self, nominal_hz: float, span_s: float) -> bool:
         """Whether it is not the nominal one, in a take of length `span_s`."""
         gap = abs(self.value_hz - nominal_hz)
-        return gap > SIGNIFICANT * self.sd_hz and gap * span_s > MATTERS
+        return gap > FREQUENCY.significant_sd * self.sd_hz and gap * span_s > FREQUENCY.least_phase
 
 
 def bends_of(tracks: Array) -> Array:
@@ -52,7 +47,9 @@ def seen_frequency(time_s: Array, tracks: Array, nominal_hz: float) -> SeenFrequ
     bends = bends_of(tracks)
     signals = [(time_s[np.isfinite(b)], b[np.isfinite(b)]) for b in bends.T]
     signals = [
-        (t, b) for t, b in signals if len(t) > 8 * HARMONICS and np.ptp(t) * nominal_hz > FEWEST_CYCLES
+        (t, b)
+        for t, b in signals
+        if len(t) > 8 * FREQUENCY.harmonics and np.ptp(t) * nominal_hz > FREQUENCY.least_cycles
     ]
     if not signals or nominal_hz <= 0:
         return None
@@ -62,12 +59,12 @@ def seen_frequency(time_s: Array, tracks: Array, nominal_hz: float) -> SeenFrequ
 
     span = max(float(np.ptp(t)) for t, _ in signals)
     # least squares has side minima one resolution 1/span apart: five points on each
-    count = 2 * math.ceil(5 * SEARCHED * nominal_hz * span) + 1
-    grid = nominal_hz * (1 + SEARCHED * np.linspace(-1, 1, max(count, 21)))
+    count = 2 * math.ceil(5 * FREQUENCY.searched_share * nominal_hz * span) + 1
+    grid = nominal_hz * (1 + FREQUENCY.searched_share * np.linspace(-1, 1, max(count, 21)))
     cost = [left(f) for f in grid]
     k = int(np.argmin(cost))
     total = sum(float(((b - b.mean()) ** 2).sum()) for _, b in signals)
-    if not 0 < k < len(grid) - 1 or cost[k] > 0.5 * total:
+    if not 0 < k < len(grid) - 1 or cost[k] > FREQUENCY.most_left * total:
         return None
     options = {"xatol": 1e-7 * nominal_hz}
     found = minimize_scalar(left, bounds=(grid[k - 1], grid[k + 1]), method="bounded", options=options)
@@ -76,7 +73,7 @@ def seen_frequency(time_s: Array, tracks: Array, nominal_hz: float) -> SeenFrequ
     bend = (left(found.x + step) + left(found.x - step) - 2 * here) / step**2
     values = sum(len(t) for t, _ in signals)
     # what is left is smooth in time: a cycle's samples count as two per harmonic
-    independent = min(values, 2 * HARMONICS * span * nominal_hz * len(signals))
+    independent = min(values, 2 * FREQUENCY.harmonics * span * nominal_hz * len(signals))
     variance = here / values * (values / independent)
     return SeenFrequency(float(found.x), math.sqrt(2 * variance / max(bend, 1e-30)))
 
@@ -86,7 +83,7 @@ def far_frequency(time_s: Array, tracks: Array, nominal_hz: float) -> float | No
     bends = bends_of(tracks)
     whole = bends[np.isfinite(bends).all(axis=1)]
     time = time_s[np.isfinite(bends).all(axis=1)]
-    if len(time) < 8 * HARMONICS or not whole.size or not np.ptp(time) > 0:
+    if len(time) < 8 * FREQUENCY.harmonics or not whole.size or not np.ptp(time) > 0:
         return None
     grid = np.arange(max(1.5 / np.ptp(time), nominal_hz / 5), 3 * nominal_hz, 0.1 / np.ptp(time))
     if not len(grid):
@@ -94,11 +91,12 @@ def far_frequency(time_s: Array, tracks: Array, nominal_hz: float) -> float | No
     cost = np.array([sum(_left(time, b, f) for b in whole.T) for f in (*grid, nominal_hz)])
     total = float(((whole - whole.mean(axis=0)) ** 2).sum())
     k = int(np.argmin(cost[:-1]))
-    return float(grid[k]) if cost[k] < 0.2 * total and cost[-1] > 0.5 * total else None
+    told = cost[k] < FREQUENCY.far_left * total and cost[-1] > FREQUENCY.most_left * total
+    return float(grid[k]) if told else None
 
 
 def _left(time_s: Array, bend: Array, frequency_hz: float) -> float:
-    wave = 2 * np.pi * frequency_hz * time_s[:, None] * np.arange(1, HARMONICS + 1)
+    wave = 2 * np.pi * frequency_hz * time_s[:, None] * np.arange(1, FREQUENCY.harmonics + 1)
     basis = np.column_stack([np.sin(wave), np.cos(wave), np.ones_like(time_s)])
     best = np.linalg.lstsq(basis, bend, rcond=None)[0]
     return float(((bend - basis @ best) ** 2).sum())

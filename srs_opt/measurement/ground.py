@@ -7,8 +7,8 @@ import numpy as np
 from srs_opt.errors import InputError
 from srs_opt.measurement.noise import MAD
 from srs_opt.measurement.records import Array
+from srs_opt.measurement.take_settings import IMPORT
 
-SNAP_DEG = 5.0
 UPS = {
     sign + axis: np.eye(3)[i] * (-1.0 if sign else 1.0) for i, axis in enumerate("xyz") for sign in ("", "-")
 }
@@ -17,8 +17,9 @@ UPS = {
 def ground_axes(points_m: Array, up: str = "auto") -> tuple[Array, Array]:
     """Return the two axes of the ground plane (2, 3) and the direction up (3,), a right-handed triple.
 
-    The plane is that of least spread. A normal within `SNAP_DEG` of one of Motive's axes is taken to be that
-    axis. Which side is up cannot be seen in the data: it is Motive's +Y (its default), else +Z, else +X.
+    The plane is that of least spread. A normal within `ImportSettings.snap_deg` of one of Motive's axes is
+    taken to be that axis. Which side is up cannot be seen in the data: it is Motive's +Y (its default), else
+    +Z, else +X.
 
     Parameters
     ----------
@@ -42,7 +43,7 @@ def ground_axes(points_m: Array, up: str = "auto") -> tuple[Array, Array]:
         raise InputError("too few positions to find the ground plane; give it with --up")
     normal = _thinnest(points)
     nearest = int(np.argmax(np.abs(normal)))
-    if abs(normal[nearest]) > np.cos(np.radians(SNAP_DEG)):
+    if abs(normal[nearest]) > np.cos(np.radians(IMPORT.snap_deg)):
         normal = np.eye(3)[nearest]
     side = next(axis for axis in (1, 2, 0) if abs(normal[axis]) > 0.1)
     normal = normal * np.sign(normal[side])

@@ -19,16 +19,12 @@ from srs_opt.measurement.frequency import far_frequency, seen_frequency
 from srs_opt.measurement.ground import ground_axes, to_ground, without_ghosts
 from srs_opt.measurement.labels import follow, take
 from srs_opt.measurement.noise import noise_sd
-from srs_opt.measurement.onset import (
-    QUIET_FRAMES,
-    Onset,
-    find_onset,
-    first_motion,
-)
+from srs_opt.measurement.onset import Onset, find_onset, first_motion
 from srs_opt.measurement.read import parse_schedule
 from srs_opt.measurement.records import KINDS, Array, Bench, Check, DataSet, Schedule, Trial
 from srs_opt.measurement.run_in import run_in_s
 from srs_opt.measurement.spots import Spots
+from srs_opt.measurement.take_settings import IMPORT, ONSET
 from srs_opt.measurement.takes.take import Take
 from srs_opt.measurement.valve_wave import ValveWave
 from srs_opt.problem import Report
@@ -47,9 +43,6 @@ OPTIONAL = (
     "replicate_of",
     "kind",
 )
-BEFORE_STEP_S = 0.3
-SETTLED_S = 0.6  # after the first motion the bends repeat from cycle to cycle within their noise
-SAME_RATE = 1e-3  # rates found from rounded times differ by less
 SCALES = ((1.0, "metres"), (1e-3, "millimetres"), (1e-2, "centimetres"), (0.0254, "inches"))
 
 
@@ -162,7 +155,7 @@ def import_takes(
         If a trial has no take, or the robot cannot be found in one.
     """
     rates = {round(t.rate_hz, 6) for t in takes}
-    if max(rates) / min(rates) > 1 + SAME_RATE:
+    if max(rates) / min(rates) > 1 + IMPORT.same_rate_share:
         raise InputError(f"the takes have different frame rates ({', '.join(map(str, sorted(rates)))} Hz)")
     trials, notes = [], []
     for row in rows:
@@ -346,7 +339,7 @@ def _valve_start(
         if moved is None:
             raise InputError(f"{source.source}: the markers never move (kind step): give valve_start_s")
         # a few frames at rest tell the curvature before; the step's fit finds its own delay
-        return Onset(max(float(source.time_s[moved]) - BEFORE_STEP_S, first), math.nan)
+        return Onset(max(float(source.time_s[moved]) - IMPORT.before_step_s, first), math.nan)
     onset = find_onset(robot, gait, source.time_s, tracks, options.spots)
     if onset.doubt:
         known = "phase of the valves" if onset.moving else "start"
@@ -363,7 +356,7 @@ def _seen_gait(gait: ValveWave, time_s: Array, tracks: Array, warnings: list[str
         return gait
     moving = first_motion(tracks.reshape(len(tracks), -1), noise_sd(tracks)) or 0
     # the bends' build-up after the start is not periodic
-    running = time_s > time_s[moving] + (SETTLED_S if moving > QUIET_FRAMES else 0.0)
+    running = time_s > time_s[moving] + (IMPORT.settled_s if moving > ONSET.quiet_frames else 0.0)
     seen = seen_frequency(time_s[running], tracks[running], gait.frequency_hz)
     if seen is None and (far := far_frequency(time_s[running], tracks[running], gait.frequency_hz)):
         warnings.append(f"the bends repeat at about {far:.3g} Hz; {gait.frequency_hz:g} Hz is listed: which?")

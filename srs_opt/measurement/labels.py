@@ -14,11 +14,7 @@ import numpy as np
 from srs_opt.measurement.chain import Chain
 from srs_opt.measurement.find_chain import find_chain
 from srs_opt.measurement.records import Array
-
-NEAR = 0.45  # of a pitch: farther from its prediction, a position is not this link's
-FARTHEST = 0.9  # of a pitch: the gate of a link that was lost for long
-BLIND = 3  # frames without any position after which the chain is looked for anew
-SLACK = 1.2  # neighbours may not be farther apart than this many pitches
+from srs_opt.measurement.take_settings import LABELS
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,14 +64,15 @@ def _suspicious(chain: Chain, points: Array) -> bool:
     """Whether any marker jumps between sightings, as those do whose labels are exchanged in some frames."""
     for marker in range(points.shape[1]):
         seen = points[np.isfinite(points[:, marker, 0]), marker]
-        if len(seen) and (np.linalg.norm(np.diff(seen, axis=0), axis=1) > NEAR * chain.pitch_m).any():
+        jumps = np.linalg.norm(np.diff(seen, axis=0), axis=1)
+        if (jumps > LABELS.near_pitch * chain.pitch_m).any():
             return True
     return False
 
 
 def fits_chain(chain: Chain, frame: Array) -> bool:
     """Whether no two seen markers lie farther apart than the chain between them is long."""
-    return bool(np.all(_stretch(chain, frame)[1] <= SLACK))
+    return bool(np.all(_stretch(chain, frame)[1] <= LABELS.slack))
 
 
 def _stretch(chain: Chain, frame: Array) -> tuple[np.ndarray, Array]:
@@ -125,7 +122,11 @@ def follow(chain: Chain, cloud: Array, start: int, order: np.ndarray) -> np.ndar
 def _found_again(chain: Chain, positions: Array, last: Array, age: np.ndarray) -> np.ndarray:
     """Find the whole chain anew after frames in which it was lost: it has moved on, by a link perhaps."""
     known = np.isfinite(last[:, 0])
-    if age.min() < BLIND or np.isfinite(positions[:, 0]).sum() < chain.markers or known.sum() < 2:
+    if (
+        age.min() < LABELS.lost_frames
+        or np.isfinite(positions[:, 0]).sum() < chain.markers
+        or known.sum() < 2
+    ):
         return np.full(chain.markers, -1)
     order = find_chain(chain, positions)
     if order is None:
@@ -143,7 +144,7 @@ def _assign(chain: Chain, positions: Array, last: Array, age: np.ndarray) -> np.
     if not len(seen) or not len(known):
         return owners
     distance = np.linalg.norm(positions[seen, None] - last[None, known], axis=2)
-    gate = chain.pitch_m * np.minimum(NEAR * np.sqrt(1 + age[known] / 10), FARTHEST)
+    gate = chain.pitch_m * np.minimum(LABELS.near_pitch * np.sqrt(1 + age[known] / 10), LABELS.farthest_pitch)
     # a distance beyond the gate costs a constant, so that it does not push others out of place
     cost = np.minimum(distance / gate, 1.0)
     rows, columns = linear_sum_assignment(cost)

@@ -13,12 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from srs_opt.errors import InputError
+from srs_opt.measurement.fit_settings import STEADY
 from srs_opt.measurement.records import DataSet, MapRow, Trial
-from srs_opt.measurement.steady_fit import DEFAULT_HARMONICS, Complex, SteadyFit, fit_steady
-
-FEWEST_CYCLES = 2
-FEWEST_BLOCKS, MOST_BLOCKS = 4, 12
-STRAIGHT_LENGTHS = 100.0  # a radius beyond so many robot lengths is called straight
+from srs_opt.measurement.steady_fit import Complex, SteadyFit, fit_steady
 
 
 @dataclass(frozen=True)
@@ -42,7 +39,7 @@ class Motion:
         Turn rate positive to the left.
     radius_m : Interval or None
         Signed (+ left); None when straight: the turn rate's interval holds 0, or the radius is beyond
-        `STRAIGHT_LENGTHS` robot lengths.
+        `SteadyMotionSettings.straight_lengths` robot lengths.
     cycles : int
         Whole cycles used.
     from_s, to_s : float
@@ -69,7 +66,7 @@ def trial_motion(
     marker_sd_m: float,
     length_m: float,
     confidence: float = 0.95,
-    harmonics: int = DEFAULT_HARMONICS,
+    harmonics: int | None = None,
 ) -> Motion:
     """Return the steady motion of `trial`.
 
@@ -94,10 +91,12 @@ def trial_motion(
     time, tracks = trial.time_s, _tracks(trial)
     period = trial.period_s
     whole = math.floor((float(time[-1] - time[0]) + 1e-9) / period) if math.isfinite(period) else 0
-    if whole < FEWEST_CYCLES + 1:
+    if whole < STEADY.least_cycles + 1:
         raise InputError(
-            f"trial '{trial.name}': {whole} whole cycles; steady motion needs {FEWEST_CYCLES + 1} or more"
+            f"trial '{trial.name}': {whole} whole cycles; steady motion needs {STEADY.least_cycles + 1} "
+            "or more"
         )
+    harmonics = STEADY.harmonics if harmonics is None else harmonics
     harmonics = max(1, min(harmonics, int(period / float(np.median(np.diff(time))) / 4)))
     end = float(time[-1])
     cycles, settled = _settled_cycles(time, tracks, period, whole, harmonics, marker_sd_m)
@@ -142,18 +141,18 @@ def _settled_cycles(
     """
     from scipy.stats import norm
 
-    fewest = max(FEWEST_CYCLES, whole // 2)
+    fewest = max(STEADY.least_cycles, whole // 2)
     floor, fits = 0.0, {}
     for cycles in range(fewest, whole):
         window = time >= time[-1] - cycles * period - 1e-9
         fits[cycles] = fit_steady(time[window], tracks[window], period, harmonics)
         floor = max(fits[fewest].variance_m2, sd**2)
         if cycles > fewest and fits[cycles].variance_m2 > floor * _headroom(
-            fits[cycles].freedom, norm.ppf(0.99)
+            fits[cycles].freedom, norm.ppf(STEADY.settled_level)
         ):
             cycles -= 1
             break
-    settled = fits[fewest].variance_m2 <= 1.5 * sd**2 if sd > 0 else True
+    settled = fits[fewest].variance_m2 <= STEADY.settled_variance * sd**2 if sd > 0 else True
     return cycles, bool(settled)
 
 
@@ -164,7 +163,7 @@ def _headroom(freedom: float, quantile: float) -> float:
 
 def _blocks(time: np.ndarray, end: float, period: float, cycles: int) -> np.ndarray:
     """Return the block (whole cycles from the end; half cycles when there are few) of every sample."""
-    count = min(cycles if cycles >= FEWEST_BLOCKS else 2 * cycles, MOST_BLOCKS)
+    count = min(cycles if cycles >= STEADY.least_blocks else 2 * cycles, STEADY.most_blocks)
     number = np.floor((end - time) / period * count / cycles + 1e-9).astype(int)
     interval: np.ndarray = np.clip(number, 0, count - 1)
     return interval
@@ -196,7 +195,7 @@ def _radius(
     """Return the signed radius; its interval is that of the path's curvature, inverted."""
     bend = _interval(fit.curvature_1_m, [f.curvature_1_m for f in replicas], confidence)
     straight = rate.low is not None and rate.high is not None and rate.low <= 0 <= rate.high
-    if straight or abs(bend.value) * STRAIGHT_LENGTHS * length_m < 1:
+    if straight or abs(bend.value) * STEADY.straight_lengths * length_m < 1:
         return None
     value = 1 / bend.value
     if bend.sd is None or bend.low is None or bend.high is None:

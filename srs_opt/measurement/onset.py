@@ -13,17 +13,9 @@ from srs_opt.measurement.noise import noise_sd
 from srs_opt.measurement.records import Array
 from srs_opt.measurement.run_in import likely_start_s, run_in_s
 from srs_opt.measurement.spots import Spots
+from srs_opt.measurement.take_settings import ONSET
 from srs_opt.measurement.valve_wave import ValveWave, first_curvatures
 from srs_opt.robot import Robot
-
-THRESHOLD = 6.0
-QUIET_FRAMES = 5
-CYCLES = 2.0
-# a fit that leaves more than this share of the shapes' change is not the motion that was asked for: from 0.2
-# a wrong phase lag passes, at 0.5 a robot whose segments differ is refused
-MOST_LEFT = 0.35
-DRIFT = 8.0  # standard deviations of chi squared; rest on a shaking table stays below
-PHASES = 24  # tried per cycle
 
 
 @dataclass(frozen=True)
@@ -74,28 +66,30 @@ def find_onset(
     moving = first_motion(markers_m.reshape(len(markers_m), -1), noise_sd(markers_m))
     if moving is None:
         raise NoAnswerError("the markers never move: give valve_start_s by hand")
-    if moving < QUIET_FRAMES:
+    if moving < ONSET.quiet_frames:
         return find_phase(robot, wave, time_s, markers_m, spots)
     running: Onset | None = None
-    if _drifts(markers_m.reshape(len(markers_m), -1)[: max(moving // 2, QUIET_FRAMES)], noise_sd(markers_m)):
+    if _drifts(
+        markers_m.reshape(len(markers_m), -1)[: max(moving // 2, ONSET.quiet_frames)], noise_sd(markers_m)
+    ):
         running = find_phase(robot, wave, time_s, markers_m, spots)
         if not running.doubt:
             return running
     centre, settle = float(time_s[moving]), robot.tau1_s + robot.tau2_s
-    window = (time_s > centre - 2 * settle) & (time_s < centre + CYCLES / wave.frequency_hz)
+    window = (time_s > centre - 2 * settle) & (time_s < centre + ONSET.cycles / wave.frequency_hz)
     time, points = time_s[window], markers_m[window]
     low, high = max(centre - settle, float(time_s[0])), centre + float(np.median(np.diff(time_s)))
-    grid = np.linspace(low, centre, 25)
+    grid = np.linspace(low, centre, ONSET.grid)
     found = _fitted(robot, wave, time, points, chain_of(robot, spots), grid, (low, high))
     bracket = float((high - low) / np.sqrt(12))
-    if found.left > MOST_LEFT or found.edge:
+    if found.left > ONSET.most_left or found.edge:
         # the start may lie before the first frame, and what was taken for rest be the slow first bend
         running = running or find_phase(robot, wave, time_s, markers_m, spots)
-        if running.left < min(found.left, MOST_LEFT):
+        if running.left < min(found.left, ONSET.most_left):
             return running
         reason = (
             found.complaint
-            if found.left > MOST_LEFT
+            if found.left > ONSET.most_left
             else "the best start lies at the end of what the first motion allows"
         )
         return Onset((low + high) / 2, bracket, reason)
@@ -113,12 +107,12 @@ def find_phase(
     """
     period = 1 / wave.frequency_hz
     first = float(time_s[0])
-    window = time_s < first + 2 * CYCLES * period
+    window = time_s < first + 2 * ONSET.cycles * period
     run_in = run_in_s(wave.frequency_hz)
     chain = chain_of(robot, spots)
 
     def fitted(latest: float, low: float, high: float) -> _Fitted:
-        grid = latest - period * np.arange(PHASES) / PHASES
+        grid = latest - period * np.arange(ONSET.phases) / ONSET.phases
         return _fitted(robot, wave, time_s[window], markers_m[window], chain, grid, (low, high))
 
     latest = first - run_in
@@ -131,7 +125,7 @@ def find_phase(
     chosen = likely_start_s(robot, wave, time_s, markers_m, spots, noise, starts)
     found = just_begun if chosen == just_begun.start_s else running
     bracket = float(period / np.sqrt(12))
-    if found.left > MOST_LEFT:
+    if found.left > ONSET.most_left:
         return Onset(chosen, bracket, found.complaint, True, found.left)
     return Onset(chosen, min(found.sd_s, bracket), "", True, found.left)
 
@@ -170,7 +164,8 @@ def _fitted(
 
     low, high = limits
     costs = [float((gaps(np.array([start, 1.0, 1.0])) ** 2).sum()) for start in grid]
-    bounds = ([low, 0.3, 0.3], [high, 3.0, 3.0])
+    least, most = ONSET.factor_range
+    bounds = ([low, least, least], [high, most, most])
     fits = [
         least_squares(gaps, [grid[k], 1.0, 1.0], bounds=bounds, x_scale=[0.01, 0.1, 0.1], diff_step=1e-5)
         for k in np.argsort(costs)[:6:3]
@@ -213,9 +208,9 @@ def _drifts(flat: Array, sd: float) -> bool:
     if not flat.size:
         return False
     steps = np.arange(len(flat)) - (len(flat) - 1) / 2
-    slope = steps @ flat / (steps @ steps)
-    chi2 = float((slope**2).sum() * (steps @ steps)) / max(sd, 1e-9) ** 2
-    drifts: bool = chi2 > flat.shape[1] + DRIFT * np.sqrt(2 * flat.shape[1])
+    trend = steps @ flat / (steps @ steps)
+    chi2 = float((trend**2).sum() * (steps @ steps)) / max(sd, 1e-9) ** 2
+    drifts: bool = chi2 > flat.shape[1] + ONSET.drift_sd * np.sqrt(2 * flat.shape[1])
     return drifts
 
 
@@ -226,8 +221,8 @@ def first_motion(flat: Array, sd: float) -> int | None:
     rest = np.full(flat.shape[1], np.nan)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", category=RuntimeWarning)  # a marker lost throughout the rest
-        rest = np.nanmedian(flat[:QUIET_FRAMES], axis=0)
+        rest = np.nanmedian(flat[: ONSET.quiet_frames], axis=0)
         off = np.nanmax(np.abs(flat - rest), axis=1)
-    beyond = np.nan_to_num(off) > THRESHOLD * max(sd, 1e-9)
+    beyond = np.nan_to_num(off) > ONSET.threshold_sd * max(sd, 1e-9)
     run = beyond[:-2] & beyond[1:-1] & beyond[2:]
     return int(np.argmax(run)) if run.any() else None

@@ -14,23 +14,16 @@ import numpy as np
 from srs_opt.measurement.chain import chain_of, marker_positions
 from srs_opt.measurement.records import Array
 from srs_opt.measurement.spots import Spots
+from srs_opt.measurement.take_settings import RUN_IN
 from srs_opt.measurement.valve_wave import ValveWave
 from srs_opt.robot import Robot
 from srs_opt.simulate.integrate import Integrator
 from srs_opt.simulate.interpolate import linear
 
-LEAST_RUN_IN_S, LEAST_RUN_IN_CYCLES = 1.5, 3  # after which a gait has forgotten how it began
-LEAST_CYCLES = 4  # in the recording: half of them are compared with the others
-SEEN_CYCLES = 12
-# by how much of what a cycle lacks a model may be wrong: half of it is what 30 % of friction change
-MODEL_SHARE = 0.5
-LEAST_SD = 0.002  # of a share; settled cycles of a simulated robot differ by a quarter of that
-EVIDENCE = 9.0  # of twice the log likelihood, before a start later than that of a whole run-in is believed
-
 
 def run_in_s(frequency_hz: float) -> float:
     """Return the time of whole cycles after which a gait has forgotten how it began."""
-    cycles = max(LEAST_RUN_IN_CYCLES, int(np.ceil(LEAST_RUN_IN_S * frequency_hz)))
+    cycles = max(RUN_IN.least_run_in_cycles, int(np.ceil(RUN_IN.least_s * frequency_hz)))
     return cycles / frequency_hz
 
 
@@ -53,7 +46,7 @@ def likely_start_s(
         Standard deviation of a coordinate.
     """
     period, first = 1 / wave.frequency_hz, float(time_s[0])
-    whole = min(int((time_s[-1] - first) / period), SEEN_CYCLES)
+    whole = min(int((time_s[-1] - first) / period), RUN_IN.seen_cycles)
     marks = np.asarray(first + period * np.arange(whole + 1), dtype=np.float64)
     seen, sd = _shares(time_s, markers_m.mean(axis=1), marks, noise_m / math.sqrt(markers_m.shape[1]))
     if seen is None:
@@ -68,10 +61,10 @@ def likely_start_s(
         if expected is None:
             misfits.append(math.inf)
             continue
-        spread = np.sqrt(sd**2 + (MODEL_SHARE * (1 - expected)) ** 2)
+        spread = np.sqrt(sd**2 + (RUN_IN.model_share * (1 - expected)) ** 2)
         misfits.append(float(np.sum(((seen - expected) / spread) ** 2 + 2 * np.log(spread))))
     best = int(np.argmin(misfits))
-    return float(starts_s[best if misfits[0] - misfits[best] > EVIDENCE else 0])
+    return float(starts_s[best if misfits[0] - misfits[best] > RUN_IN.evidence else 0])
 
 
 def _shares(time_s: Array, middle_m: Array, marks_s: Array, sd_m: float) -> tuple[Array | None, float]:
@@ -81,11 +74,11 @@ def _shares(time_s: Array, middle_m: Array, marks_s: Array, sd_m: float) -> tupl
     late ways themselves, whichever is larger.
     """
     whole = np.isfinite(middle_m).all(axis=1)
-    if len(marks_s) <= LEAST_CYCLES or whole.sum() < 2:
+    if len(marks_s) <= RUN_IN.least_cycles or whole.sum() < 2:
         return None, math.nan
     ways = np.linalg.norm(np.diff(linear(time_s[whole], middle_m[whole], marks_s), axis=0), axis=1)
     early, late = np.split(ways, [len(ways) // 2])
     mean = float(late.mean())
     if not mean > 10 * sd_m:  # it hardly moves on
         return None, math.nan
-    return early / mean, max(math.sqrt(2) * sd_m / mean, float(late.std(ddof=1)) / mean, LEAST_SD)
+    return early / mean, max(math.sqrt(2) * sd_m / mean, float(late.std(ddof=1)) / mean, RUN_IN.least_sd)

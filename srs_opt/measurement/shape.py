@@ -20,13 +20,10 @@ from srs_opt.measurement.chain import (
     marker_jacobian,
     marker_positions,
 )
+from srs_opt.measurement.fit_settings import SHAPE
 from srs_opt.measurement.records import Array
 from srs_opt.measurement.spots import Spots
 from srs_opt.robot import Robot
-
-PRIOR_BEND_RAD = 0.5
-FAR_M, FAR_RAD = 1e3, 1e2
-ITERATIONS = 40
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,15 +101,18 @@ def shape_from_markers(
     if not np.isfinite(points).any():
         raise InputError("every marker is lost in every frame: there is no shape to find")
     if prior_sd_1_m is None:
-        prior_sd_1_m = PRIOR_BEND_RAD / chain.segment_length_m
+        prior_sd_1_m = SHAPE.prior_bend_rad / chain.segment_length_m
     start = first_guess(chain, points)
-    prior = np.array([FAR_M**-2, FAR_M**-2, FAR_RAD**-2, *[prior_sd_1_m**-2] * (chain.links - 1)])
+    prior = np.array(
+        [SHAPE.far_m**-2, SHAPE.far_m**-2, SHAPE.far_rad**-2, *[prior_sd_1_m**-2] * (chain.links - 1)]
+    )
     q, cost = _levenberg_marquardt(chain, points, marker_sd_m, prior, start)
     information, _ = _normal_equations(chain, points, marker_sd_m, q)
     covariance: Array = np.linalg.inv(information + np.diag(prior)).astype(float)
     spread = np.linalg.eigvalsh(covariance[:, 3:, 3:])[:, -1] / prior_sd_1_m**2
     misfit = cost - (q**2 * prior).sum(axis=1)
-    return Shape(q[:, :2], q[:, 2], q[:, 3:], covariance, misfit, spread < 0.5, float(prior_sd_1_m))
+    told = spread < SHAPE.undetermined_share
+    return Shape(q[:, :2], q[:, 2], q[:, 3:], covariance, misfit, told, float(prior_sd_1_m))
 
 
 def residuals(chain: Chain, points: Array, q: Array) -> Array:
@@ -141,19 +141,19 @@ def _levenberg_marquardt(
     q, damping = start.copy(), np.full(len(points), 1e-3)
     cost = _cost(chain, points, sd, prior, q)
     active = np.arange(len(points))
-    for _ in range(ITERATIONS):
-        matrix, slope = _normal_equations(chain, points[active], sd, q[active])
+    for _ in range(SHAPE.iterations):
+        matrix, gradient = _normal_equations(chain, points[active], sd, q[active])
         matrix = matrix + np.diag(prior)
-        slope = slope - q[active] * prior
+        gradient = gradient - q[active] * prior
         scale = np.diagonal(matrix, axis1=1, axis2=2) * damping[active, None]
-        step = np.linalg.solve(matrix + scale[..., None] * np.eye(len(prior)), slope[..., None])[..., 0]
+        step = np.linalg.solve(matrix + scale[..., None] * np.eye(len(prior)), gradient[..., None])[..., 0]
         trial = q[active] + step
         new = _cost(chain, points[active], sd, prior, trial)
         better = new <= cost[active]
         gain = cost[active] - new
         q[active[better]], cost[active[better]] = trial[better], new[better]
         damping[active] *= np.where(better, 0.1, 10.0)
-        active = active[~(better & (gain < 1e-6)) & (damping[active] < 1e8)]
+        active = active[~(better & (gain < SHAPE.least_gain)) & (damping[active] < 1e8)]
         if not len(active):
             break
     return q, cost

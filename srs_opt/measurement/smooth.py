@@ -15,13 +15,11 @@ import numpy as np
 
 from srs_opt.errors import InputError
 from srs_opt.measurement.chain import Chain, chain_of, marker_jacobian
+from srs_opt.measurement.fit_settings import SHAPE, SMOOTHER
 from srs_opt.measurement.records import Array
-from srs_opt.measurement.shape import FAR_M, FAR_RAD, PRIOR_BEND_RAD, first_guess, residuals
+from srs_opt.measurement.shape import first_guess, residuals
 from srs_opt.measurement.spots import Spots
 from srs_opt.robot import Robot
-
-START_LOG10 = (-0.5, 1.5, 5.5)  # of the intensities of position, heading, curvature
-TUNING_FRAMES = 360
 
 
 @dataclass(frozen=True)
@@ -141,19 +139,21 @@ def likeliest_intensity(problem: _Problem) -> Intensity:
     """Return the intensities of greatest marginal likelihood (first few seconds of the trial)."""
     from scipy.optimize import minimize
 
-    part = problem.part(TUNING_FRAMES)
+    part = problem.part(SMOOTHER.tuning_frames)
     state = {"z": _start(part)}
 
     def cost(log10: np.ndarray) -> float:
         spread = Intensity(*(10.0 ** np.clip(log10, -8, 12))).per_component(part.chain)
-        z, (diagonal, coupling) = _most_probable(part, spread, state["z"], iterations=6)
+        z, (diagonal, coupling) = _most_probable(
+            part, spread, state["z"], iterations=SMOOTHER.tuning_iterations
+        )
         state["z"] = z
         factor = _banded_cholesky(diagonal, coupling)
         log_det = 2 * np.log(factor[0]).sum()
         prior_log_det = -2 * (len(z) - 1) * np.log(spread).sum()
         return float(_objective(part, spread, z) + log_det - prior_log_det) / 2
 
-    start = np.array(START_LOG10)
+    start = np.array(SMOOTHER.start_log10)
     simplex = start + np.vstack([np.zeros(3), np.eye(3)])
     options: dict[str, Any] = {"xatol": 0.05, "fatol": 0.2, "maxfev": 80, "initial_simplex": simplex}
     found = minimize(cost, start, method="Nelder-Mead", options=options)
@@ -168,8 +168,8 @@ def _start(problem: _Problem) -> Array:
 def _first_prior(problem: _Problem) -> tuple[Array, Array]:
     """Return mean and precision of the first state: near the first guess, slow, hardly bent."""
     chain = problem.chain
-    bend = PRIOR_BEND_RAD / chain.segment_length_m
-    sds = [FAR_M, FAR_M, FAR_RAD, *[bend] * (chain.links - 1)]
+    bend = SHAPE.prior_bend_rad / chain.segment_length_m
+    sds = [SHAPE.far_m, SHAPE.far_m, SHAPE.far_rad, *[bend] * (chain.links - 1)]
     rates = [1.0, 1.0, 10.0, *[20 * bend] * (chain.links - 1)]
     return np.zeros(2 * chain.unknowns), np.array([*sds, *rates]) ** -2.0
 
@@ -191,20 +191,21 @@ def _objective(problem: _Problem, spread: Array, z: Array) -> float:
 
 
 def _most_probable(
-    problem: _Problem, spread: Array, start: Array, iterations: int = 30
+    problem: _Problem, spread: Array, start: Array, iterations: int | None = None
 ) -> tuple[Array, tuple[Array, Array]]:
     """Return the most probable path (T, 2n) and the blocks of its information matrix."""
+    iterations = SMOOTHER.iterations if iterations is None else iterations
     z, cost, damping = start, _objective(problem, spread, start), 1e-6
     prior_blocks = _prior_blocks(problem, spread)
-    blocks, slope = _linearise(problem, spread, z, prior_blocks)
+    blocks, gradient = _linearise(problem, spread, z, prior_blocks)
     for _ in range(iterations):
-        step = _solve(blocks[0], blocks[1], slope, damping)
+        step = _solve(blocks[0], blocks[1], gradient, damping)
         new_cost = _objective(problem, spread, z + step)
         if new_cost <= cost:
             gain, z, cost = cost - new_cost, z + step, new_cost
             damping = max(damping * 0.1, 1e-9)
-            blocks, slope = _linearise(problem, spread, z, prior_blocks)
-            if gain < 1e-3:
+            blocks, gradient = _linearise(problem, spread, z, prior_blocks)
+            if gain < SMOOTHER.least_gain:
                 break
         else:
             damping *= 30.0
@@ -242,20 +243,20 @@ def _prior_blocks(problem: _Problem, spread: Array) -> tuple[Array, Array]:
 def _linearise(
     problem: _Problem, spread: Array, z: Array, prior: tuple[Array, Array]
 ) -> tuple[tuple[Array, Array], Array]:
-    """Return the information matrix's blocks at `z` and minus half the gradient there."""
+    """Return the information matrix's blocks at `z` and minus half the gradient of the objective there."""
     chain, n = problem.chain, problem.chain.unknowns
     diagonal, coupling = prior[0].copy(), prior[1]
     mean, precision = _first_prior(problem)
-    slope = -(prior[0] @ z[..., None])[..., 0]
-    slope[:-1] -= (coupling @ z[1:, :, None])[..., 0]
-    slope[1:] -= (coupling.transpose(0, 2, 1) @ z[:-1, :, None])[..., 0]
-    slope[0] += precision * mean
+    gradient = -(prior[0] @ z[..., None])[..., 0]
+    gradient[:-1] -= (coupling @ z[1:, :, None])[..., 0]
+    gradient[1:] -= (coupling.transpose(0, 2, 1) @ z[:-1, :, None])[..., 0]
+    gradient[0] += precision * mean
     jacobian = marker_jacobian(chain, z[:, :n]) * np.isfinite(problem.points)[..., None]
     jacobian = jacobian.reshape(len(z), -1, n)
     transposed = jacobian.transpose(0, 2, 1) / problem.sd**2
     diagonal[:, :n, :n] += transposed @ jacobian
-    slope[:, :n] += (transposed @ residuals(chain, problem.points, z[:, :n])[..., None])[..., 0]
-    return (diagonal, coupling), slope
+    gradient[:, :n] += (transposed @ residuals(chain, problem.points, z[:, :n])[..., None])[..., 0]
+    return (diagonal, coupling), gradient
 
 
 def _banded(diagonal: Array, coupling: Array) -> Array:
@@ -276,15 +277,15 @@ def _banded_cholesky(diagonal: Array, coupling: Array) -> Array:
     return np.asarray(cholesky_banded(_banded(diagonal, coupling), lower=True, check_finite=False))
 
 
-def _solve(diagonal: Array, coupling: Array, slope: Array, damping: float) -> Array:
+def _solve(diagonal: Array, coupling: Array, gradient: Array, damping: float) -> Array:
     from scipy.linalg import cho_solve_banded
 
     size = diagonal.shape[1]
     damped = diagonal.copy()
     damped[:, np.arange(size), np.arange(size)] *= 1 + damping
     factor = _banded_cholesky(damped, coupling)
-    step = cho_solve_banded((factor, True), slope.ravel(), check_finite=False)
-    return np.asarray(step).reshape(slope.shape)
+    step = cho_solve_banded((factor, True), gradient.ravel(), check_finite=False)
+    return np.asarray(step).reshape(gradient.shape)
 
 
 def _marginals(diagonal: Array, coupling: Array) -> Array:

@@ -16,11 +16,10 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from srs_opt.measurement.fit_settings import STEADY
 from srs_opt.measurement.records import Array
 
 Complex = NDArray[np.complex128]
-DEFAULT_HARMONICS = 5
-FINE = 720
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +53,7 @@ class SteadyFit:
     def _mean_shape(self) -> Complex:
         """Return the markers' mean in the turning frame over one cycle."""
         h = len(self.coefficients) // 2
-        phase = np.arange(FINE) / FINE * 2 * np.pi
+        phase = np.arange(STEADY.fine) / STEADY.fine * 2 * np.pi
         return np.asarray(np.exp(1j * np.outer(phase, np.arange(-h, h + 1))) @ self.coefficients)
 
     @property
@@ -74,9 +73,7 @@ class SteadyFit:
         return None if rate == 0 else -self.drift / (1j * rate)
 
 
-def fit_steady(
-    time_s: Array, tracks: Complex, period_s: float, harmonics: int = DEFAULT_HARMONICS
-) -> SteadyFit:
+def fit_steady(time_s: Array, tracks: Complex, period_s: float, harmonics: int | None = None) -> SteadyFit:
     """Fit a steady gait.
 
     Parameters
@@ -87,10 +84,11 @@ def fit_steady(
     period_s : float
         Period of the gait (known from the valves).
     harmonics : int
-        Highest harmonic of the cycle's shape.
+        Highest harmonic of the cycle's shape; default `SteadyMotionSettings.harmonics`.
     """
     from scipy.optimize import minimize_scalar
 
+    harmonics = STEADY.harmonics if harmonics is None else harmonics
     origin = float(time_s.mean())
     t = time_s - origin
     orders = np.arange(-harmonics, harmonics + 1)

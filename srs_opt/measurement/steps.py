@@ -13,11 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from srs_opt.errors import InputError, NoAnswerError
+from srs_opt.measurement.fit_settings import STEP_TEST
 from srs_opt.measurement.records import Array, StepTest
 from srs_opt.model.actuator_law import step_response
-
-LARGEST_Q = 0.999
-GRID = 150
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +91,7 @@ def fit_step(test: StepTest, *, fit_delay: bool = False) -> StepFit:
     def model(p: Array) -> Array:
         return np.asarray(p[0] * final * step_response(time - (p[3] if fit_delay else 0.0), p[1], p[2]))
 
-    lows, highs = [-np.inf, 1e-5, -2.0, -1.0][:unknowns], [np.inf, 1e3, LARGEST_Q, 1.0][:unknowns]
+    lows, highs = [-np.inf, 1e-5, -2.0, -1.0][:unknowns], [np.inf, 1e3, STEP_TEST.largest_q, 1.0][:unknowns]
     fits = []
     for q in (0.05, 0.6):
         start = [1.0, _rise_time(time, curvature / final) / 2, q, 0.0][:unknowns]
@@ -189,14 +187,14 @@ def time_constants(s: float, q: float, covariance: Array) -> tuple[TimeConstant,
     """
     from scipy.special import ndtri
 
-    nodes = ndtri((np.arange(GRID) + 0.5) / GRID)
+    nodes = ndtri((np.arange(STEP_TEST.grid) + 0.5) / STEP_TEST.grid)
     root = np.linalg.cholesky(covariance + np.diag([1e-18, 1e-18]))
     u, v = np.meshgrid(nodes, nodes, indexing="ij")
     slope = covariance[0, 1] / covariance[1, 1] if covariance[1, 1] > 0 else 0.0
     squares = q + root[1, 0] * u + root[1, 1] * v
     means = s + root[0, 0] * u - slope * np.minimum(squares, 0.0)
-    roots = np.sqrt(np.clip(squares, 0.0, LARGEST_Q))
-    mean, best = s - slope * min(q, 0.0), float(np.sqrt(np.clip(q, 0.0, LARGEST_Q)))
+    roots = np.sqrt(np.clip(squares, 0.0, STEP_TEST.largest_q))
+    mean, best = s - slope * min(q, 0.0), float(np.sqrt(np.clip(q, 0.0, STEP_TEST.largest_q)))
     equal = s - slope * q
     reach = 1.645 * float(np.sqrt(max(covariance[0, 0] - slope * covariance[0, 1], 0.0)))
     found = []

@@ -10,12 +10,9 @@ from srs_opt.errors import InputError
 from srs_opt.measurement.records import DataSet, StepTest, Trial
 from srs_opt.measurement.shape import shape_from_markers
 from srs_opt.measurement.steps import fit_step
+from srs_opt.measurement.take_settings import STEP_TAKE
 
 LIFTED = "lifted"
-REST_FRAMES = 3
-RISEN = 0.2
-ALONE = 0.5  # of the largest change: what another segment may bend without the test being doubtful
-FEWEST_FRAMES = 8
 
 
 def steps_of(dataset: DataSet) -> tuple[tuple[StepTest, ...], tuple[str, ...]]:
@@ -48,25 +45,25 @@ def _step_of(dataset: DataSet, trial: Trial) -> tuple[StepTest, list[str]]:
     if points is None:
         raise InputError(f"trial '{trial.name}' has no markers: a step's curvature needs them")
     whole = np.isfinite(points[..., 0]).sum(axis=1) >= max(points.shape[1] - 1, 2)
-    if whole.sum() < FEWEST_FRAMES:
+    if whole.sum() < STEP_TAKE.least_frames:
         raise InputError(f"trial '{trial.name}': only {int(whole.sum())} frames show (nearly) all markers")
     shape = shape_from_markers(dataset.robot, points[whole], dataset.marker_sd_m, spots=trial.spots)
     time, kappa = trial.time_s[whole], shape.curvature_1_m
-    rest = np.median(kappa[:REST_FRAMES], axis=0)
-    change = np.median(kappa[-max(len(kappa) // 4, REST_FRAMES) :], axis=0) - rest
+    rest = np.median(kappa[: STEP_TAKE.rest_frames], axis=0)
+    change = np.median(kappa[-max(len(kappa) // 4, STEP_TAKE.rest_frames) :], axis=0) - rest
     order = np.argsort(-np.abs(change))
     segment = int(order[0])
     # the rest lasts at least half as long as the first fifth of the rise is not yet reached
-    risen = np.abs(kappa[:, segment] - rest[segment]) > RISEN * abs(change[segment])
-    before = max(int(np.argmax(risen)) // 2, REST_FRAMES)
+    risen = np.abs(kappa[:, segment] - rest[segment]) > STEP_TAKE.risen_share * abs(change[segment])
+    before = max(int(np.argmax(risen)) // 2, STEP_TAKE.rest_frames)
     at_rest = float(kappa[:before, segment].mean())
     notes = []
-    if abs(change[order[1]]) > ALONE * abs(change[segment]):
+    if abs(change[order[1]]) > STEP_TAKE.alone_share * abs(change[segment]):
         notes.append(
             f"trial '{trial.name}': segments {segment + 1} and {int(order[1]) + 1} both bend "
             f"({change[segment]:+.3g} and {change[order[1]]:+.3g} 1/m); taken for a step of {segment + 1}"
         )
-    if not shape.determined.mean() > ALONE:
+    if not shape.determined.mean() > 0.5:
         notes.append(f"trial '{trial.name}': these markers do not determine every curvature")
     condition = LIFTED if (trial.floor or "").strip().casefold() == LIFTED else "ground"
     curvature = kappa[:, segment] - at_rest
@@ -74,6 +71,6 @@ def _step_of(dataset: DataSet, trial: Trial) -> tuple[StepTest, list[str]]:
     # bench steps begin with the valve; what passes before the bend begins is rest, or the valve's dead time
     begin = fit_step(test, fit_delay=True).delay_s
     after = test.time_s >= begin
-    still = ~after if (~after).sum() >= REST_FRAMES else slice(0, REST_FRAMES)
+    still = ~after if (~after).sum() >= STEP_TAKE.rest_frames else slice(0, STEP_TAKE.rest_frames)
     curvature = kappa[after, segment] - kappa[still, segment].mean()
     return replace(test, time_s=test.time_s[after] - begin, curvature_1_m=curvature), notes

@@ -12,14 +12,10 @@ from srs_opt.measurement.chain import Chain, chain_of
 from srs_opt.measurement.noise import noise_sd
 from srs_opt.measurement.plausible import factor_of_thousand
 from srs_opt.measurement.records import TAIL_TO_HEAD, Array, Trial
+from srs_opt.measurement.take_settings import TRACK_CHECK
 from srs_opt.problem import Report
 from srs_opt.robot import Robot
 from srs_opt.table import NumberTable, read_numbers
-
-MAX_MISSING_ROWS = 5
-FARTHEST_M = 1e5  # from the origin; a fit to 1e308 m ends in not-a-number, not in an answer
-TOP_SPEED_LENGTHS_PER_S = 25.0
-FEWEST_DIFFERENCES = 100  # from which on the noise that a track shows is compared
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,16 +49,17 @@ def read_track(file: str, markers: str, chain: Chain, report: Report) -> Track |
     time = table.values[:, 0]
     points = np.ascontiguousarray(table.values[:, 1:].reshape(len(time), -1, 2))
     points, time = points.copy(), time.copy()
-    far = np.argwhere(np.abs(points) > FARTHEST_M)
+    far = np.argwhere(np.abs(points) > TRACK_CHECK.farthest_m)
     if far.size:
         frame, marker, axis = far[0]
         report.error(
             file,
             table.lines[frame],
             f"marker {marker + 1} stands {points[frame, marker, axis]:.3g} m from the origin "
-            f"(expected at most {FARTHEST_M:g} m; are these millimetres?)",
+            f"(expected at most {TRACK_CHECK.farthest_m:g} m; are these millimetres?)",
         )
-        points[(np.abs(points) > FARTHEST_M).any(axis=2)] = np.nan  # the other checks would overflow
+        # the other checks would overflow
+        points[(np.abs(points) > TRACK_CHECK.farthest_m).any(axis=2)] = np.nan
     half = np.isnan(points).any(axis=2) & ~np.isnan(points).all(axis=2)
     if half.any():
         frame, marker = np.argwhere(half)[0]
@@ -153,10 +150,11 @@ def _report_step(found: float, step: float, file: str, line: int, report: Report
         report.error(file, line, f"time_s: the clock {words} ({found:+.6g} s)")
         return False
     missing = round(found / step) - 1
-    if 1 <= missing <= MAX_MISSING_ROWS and abs(found / step - missing - 1) < 0.25:
+    if 1 <= missing <= TRACK_CHECK.most_missing_rows and abs(found / step - missing - 1) < 0.25:
         report.warn(file, line, f"time_s: {missing} frame(s) are missing before this one")
         return True
-    hint = "; if frames were lost, give them rows with empty cells" if missing > MAX_MISSING_ROWS else ""
+    many = missing > TRACK_CHECK.most_missing_rows
+    hint = "; if frames were lost, give them rows with empty cells" if many else ""
     report.error(file, line, f"time_s: the clock jumps by {found:.6g} s, expected {step:.6g} s{hint}")
     return False
 
@@ -236,7 +234,7 @@ def _check_speed(track: Track, robot: Robot, good_clock: bool, report: Report) -
         return True
     span = float(time[seen[-1]] - time[seen[0]])
     extent = float(np.ptp(points[seen], axis=0).max())
-    limit = TOP_SPEED_LENGTHS_PER_S * robot.length_m
+    limit = TRACK_CHECK.top_speed_body * robot.length_m
     if extent / max(span, 1e-9) <= limit:
         return True
     message = (
@@ -250,7 +248,7 @@ def _check_noise(track: Track, marker_sd_m: float, report: Report) -> None:
     """Compare the noise that the tracks show with the one that dataset.yaml states."""
     if not marker_sd_m > 0:
         return
-    ratio = noise_sd(track.points_m, FEWEST_DIFFERENCES) / marker_sd_m
+    ratio = noise_sd(track.points_m, TRACK_CHECK.least_differences) / marker_sd_m
     message = f"marker noise is {ratio:.2g} times camera.marker_sd_m ({marker_sd_m:g} m)"
     if ratio > 200 or 0 < ratio < 1 / 200:
         report.error(track.file, None, f"{message}: units?")

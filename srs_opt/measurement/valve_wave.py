@@ -7,11 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from srs_opt.measurement.records import Array, Schedule
+from srs_opt.measurement.take_settings import RUN_IN
 from srs_opt.model.actuator_law import step_response
 from srs_opt.robot import Robot
 from srs_opt.simulate.timeline import Timeline
-
-GRID_S = 2e-4  # to which the switches are found; a camera sees 1/100 s
 
 
 @dataclass(frozen=True)
@@ -33,7 +32,7 @@ class ValveWave:
 
     def held(self, segments: int, end_s: float) -> tuple[Array, Array]:
         """Return when the valves change, (n + 1,) from 0 to `end_s`, and how they are held, (segments, n)."""
-        fine = np.arange(GRID_S / 200, max(end_s, GRID_S), GRID_S)
+        fine = np.arange(RUN_IN.switch_s / 200, max(end_s, RUN_IN.switch_s), RUN_IN.switch_s)
         states = np.array([self.states(i, fine) for i in range(1, segments + 1)])
         change = np.flatnonzero((np.diff(states, axis=1) != 0).any(axis=0))
         return np.concatenate([[0.0], fine[change], [end_s]]), states[:, np.concatenate([[0], change + 1])]
