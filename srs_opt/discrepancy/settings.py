@@ -39,7 +39,7 @@ class AdequacySettings:
         By how much of itself the size of such an effect may change when a third of the trials is left out.
     negligible, negligible_speed : float
         A gap below both is none that matters, where no effect explains it.
-    off : float
+    off, off_times : float
         Root mean square from which on a single sealed trial, beyond `off_times` what the others leave, is
         not one of the same experiment.
     closed, nearly_closed : float
