@@ -11,11 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from srs_opt.geometry import rotation_matrix
+from srs_opt.calibrate.data_settings import ALIGNMENT
+from srs_opt.geometry import quarter_turn, rotation_matrix
 
-ROUNDS = 8
-SETTLED_S = 1e-7
-DIFFERENCE_S = 1e-3  # for the velocity of the points; its error shrinks with the residual
 FREE = 4  # unknowns per trial
 
 
@@ -74,16 +72,16 @@ def align(
     """
     seen = np.isfinite(track)
     later = 0.0
-    for _ in range(ROUNDS):
+    for _ in range(ALIGNMENT.rounds):
         points = predicted(later)
         found = _rigid(track, points, later)
-        ends = [predicted(later + side * DIFFERENCE_S) for side in (1, -1)]
+        ends = [predicted(later + side * ALIGNMENT.difference_s) for side in (1, -1)]
         velocity = found.points(ends[0]) - found.points(ends[1])
         placed = found.points(points)
-        by = np.stack([*_moves(placed), velocity / (2 * DIFFERENCE_S)], axis=2)
+        by = np.stack([*_moves(placed), velocity / (2 * ALIGNMENT.difference_s)], axis=2)
         step = np.linalg.lstsq(by[seen], (track - placed)[seen], rcond=None)[0][-1]
         moved = float(np.clip(later + step, -most_s, most_s))
-        if abs(moved - later) < SETTLED_S:
+        if abs(moved - later) < ALIGNMENT.settled_s:
             break
         later = moved
     return found, by
@@ -93,7 +91,7 @@ def _moves(points: np.ndarray) -> list[np.ndarray]:
     """Return the changes of points (T, 2 M) by shifts along x and y and a turn about the origin."""
     pairs = points.reshape(len(points), -1, 2)
     along = [np.broadcast_to(np.eye(2)[k], pairs.shape) for k in range(2)]
-    turned = np.stack([-pairs[..., 1], pairs[..., 0]], axis=-1)
+    turned = quarter_turn(pairs)
     return [move.reshape(points.shape) for move in (*along, turned)]
 
 

@@ -7,18 +7,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from srs_opt.calibrate.coordinates import SCATTER_SD, Coordinate
+from srs_opt.calibrate.data_settings import OUTLYING_TRIAL
 from srs_opt.calibrate.experiment import Experiment, Point
 from srs_opt.calibrate.fit import Fit
-from srs_opt.calibrate.objective import CORRELATED
+from srs_opt.calibrate.fit_settings import OBJECTIVE
 from srs_opt.measurement.records import Trial
 
-LEAST_LEFT = 3  # trials that must agree with each other
-# Misfit beyond the noise of a trial that a fit did not see, over that of the worst trial that it saw, from
-# which on the trial is set aside. What a model lacks shows in several trials: a gait that the others do not
-# foretell is three times worse than they are; a wrong entry or another robot, twenty times and more.
-APART = 8.0
-NOTABLE = 0.5  # of the noise's variance: misfit that is worth a refit
-WORST = 3.0  # times the usual misfit that a trial must have in the fit to all, to be left out on trial
 Refit = Callable[[Sequence[str]], Fit | None]
 
 
@@ -31,8 +25,8 @@ def own_scatter(experiment: Experiment, fit: Fit, trials: Sequence[Trial]) -> Po
         moved, settled = {}, True
         for trial in trials:
             normal = equations[trial.name]
-            excess = normal.misfit / normal.count - 1 - 4 * np.sqrt(2 / normal.count)
-            back = normal.eliminated(1 + CORRELATED * max(0.0, excess)).back
+            excess = normal.misfit / normal.count - 1 - OBJECTIVE.inflation_sd * np.sqrt(2 / normal.count)
+            back = normal.eliminated(1 + OBJECTIVE.correlated_values * max(0.0, excess)).back
             now = point.scatter.get(trial.name, np.zeros(back.shape[0]))
             moved[trial.name] = np.clip(now + back[:, -1], -4 * normal.scatter_sd, 4 * normal.scatter_sd)
             settled &= bool(np.abs(moved[trial.name] - now).max() < 0.05 * normal.scatter_sd.min())
@@ -64,18 +58,22 @@ def stands_apart(
         }
         worst = max(rest, key=lambda t: misfit[t.name])
         usual = float(np.median(list(misfit.values())))
-        if len(rest) <= LEAST_LEFT or misfit[worst.name] < max(NOTABLE, WORST * usual):
+        suspicious = max(OUTLYING_TRIAL.notable_misfit, OUTLYING_TRIAL.worst_ratio * usual)
+        if len(rest) <= OUTLYING_TRIAL.least_left or misfit[worst.name] < suspicious:
             break
         without = refit([*aside, worst.name])
         if without is None:
             break
         others = [g for n, g in without.equations.items() if n != worst.name and g.scattered]
-        known = max(max(g.misfit / max(g.count, 1) - 1 for g in others), NOTABLE / APART)
+        known = max(
+            max(g.misfit / max(g.count, 1) - 1 for g in others),
+            OUTLYING_TRIAL.notable_misfit / OUTLYING_TRIAL.apart_ratio,
+        )
         normal = experiment.normal_equations(
             own_scatter(experiment, without, [worst]), _own(without), [worst]
         )[worst.name]
         off = normal.misfit / max(normal.count, 1) - 1
-        if off < APART * known:
+        if off < OUTLYING_TRIAL.apart_ratio * known:
             break
         miss, most = (1e3 * experiment.sd_m * np.sqrt(v) for v in (off, known))
         aside[worst.name] = (

@@ -9,20 +9,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from srs_opt.calibrate.data_settings import CLEANING
 from srs_opt.calibrate.noise import track_of
 from srs_opt.measurement.chain import chain_of
 from srs_opt.measurement.labels import mend_labels
 from srs_opt.measurement.noise import MAD
 from srs_opt.measurement.records import Array, DataSet, Trial
 from srs_opt.robot import Robot
-
-REACH_S = 0.034  # to either side of a frame, over which a motion is a parabola
-FEWEST, MOST = 2, 5  # frames to either side
-# robust deviations of a position from the parabola through its neighbours beyond which it is left out: by
-# chance one in a million. Half as many would leave out one good position in a hundred and bias the noise.
-FAR = 5.0
-NEARBY = 5  # times that reach: a neighbourhood, of which an outlier spoils a fifth
-PASSES = 12  # a marker that is elsewhere for several frames spoils its neighbours' parabolas
 
 
 @dataclass(frozen=True)
@@ -95,19 +88,21 @@ def outliers_of(points: Array, time_s: Array) -> np.ndarray:
     """
     frames, markers = points.shape[:2]
     wild = np.zeros((frames, markers), dtype=bool)
-    if frames < 4 * FEWEST:
+    if frames < 4 * CLEANING.least_frames:
         return wild
     frame_s = float(np.median(np.diff(time_s)))
-    reach = int(np.clip(round(REACH_S / frame_s), FEWEST, MOST)) if frame_s > 0 else FEWEST
+    reach = CLEANING.least_frames
+    if frame_s > 0:
+        reach = int(np.clip(round(CLEANING.reach_s / frame_s), reach, CLEANING.most_frames))
     off, sure = _off_parabola(points, reach)
     size = np.where(sure, np.max(np.abs(off), axis=2), 0.0)
     if not sure.any():
         return wild
     # where a quiet camera sees a quick motion, its parabolas are off by more than the noise
     usual = np.median(np.abs(off[sure])) / MAD
-    limit = FAR * np.maximum(usual, _usual_nearby(size, NEARBY * reach))
+    limit = CLEANING.outlier_sd * np.maximum(usual, _usual_nearby(size, CLEANING.neighbourhood * reach))
     some = np.arange(markers)
-    for _ in range(PASSES):
+    for _ in range(CLEANING.passes):
         found = (size >= _largest_nearby(size, reach)) & (size > limit[:, some])
         wild[:, some] |= found
         again = found.any(axis=0)

@@ -12,20 +12,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from srs_opt.calibrate.data_settings import COLOURED_NOISE
 from srs_opt.calibrate.noise import Noise, track_of
 from srs_opt.calibrate.smooth import gait_waves
 from srs_opt.calibrate.whiten import Whitening
 from srs_opt.measurement.records import Trial
-
-HARMONICS = 4  # free in every distance
-# correlation times, and variances of the correlated part over the white one's, from which it is looked for
-TIMES_S, SHARES = (0.05, 0.2, 0.8), (0.02, 0.15)
-FIRST_STEPS = (0.03, 0.4, 0.8)  # of the search for the maximum, in the logarithms of both deviations and time
-# drop of the deviance from which on noise counts as correlated: by chance once in some thousand sets
-CLEARLY = 12.0
-# What is larger is a body that moves otherwise than the model, far from the fit: white noise known from the
-# tracks does not grow, and no camera is off by more than its white noise twice over, or a millimetre.
-WHITER, MOST_WHITE, MOST_M = 1.3, 2.0, 1e-3
 
 
 def coloured(noise: Noise, trials: Sequence[Trial], residuals: Sequence[np.ndarray]) -> Noise:
@@ -41,9 +32,11 @@ def coloured(noise: Noise, trials: Sequence[Trial], residuals: Sequence[np.ndarr
         return noise
     plain = _deviance(noise, data)
     found = min(
-        (_deviance(_with(noise, share, time), data), share, time) for time in TIMES_S for share in SHARES
+        (_deviance(_with(noise, share, time), data), share, time)
+        for time in COLOURED_NOISE.times_s
+        for share in COLOURED_NOISE.shares
     )
-    if plain - found[0] < CLEARLY:
+    if plain - found[0] < COLOURED_NOISE.detected_deviance:
         return noise
     from scipy.optimize import minimize
 
@@ -53,11 +46,12 @@ def coloured(noise: Noise, trials: Sequence[Trial], residuals: Sequence[np.ndarr
         white, walk, time = np.exp(log)
         return _deviance(Noise(white, walk, time), data)
 
-    simplex = start + np.vstack([np.zeros(3), np.diag(FIRST_STEPS)])
+    simplex = start + np.vstack([np.zeros(3), np.diag(COLOURED_NOISE.first_steps)])
     options = {"xatol": 0.02, "fatol": 0.2, "maxfev": 120, "initial_simplex": simplex}
     best = minimize(of, start, method="Nelder-Mead", options=options)
     white, walk, time = np.exp(best.x)
-    if white > WHITER * noise.white_sd_m or walk > max(MOST_WHITE * noise.white_sd_m, MOST_M):
+    most_walk_m = max(COLOURED_NOISE.most_correlated * noise.white_sd_m, COLOURED_NOISE.most_correlated_m)
+    if white > COLOURED_NOISE.most_white_growth * noise.white_sd_m or walk > most_walk_m:
         return noise
     return replace(noise, white_sd_m=float(white), correlated_sd_m=float(walk), correlation_s=float(time))
 
@@ -86,7 +80,7 @@ def _distances(trial: Trial, residual: np.ndarray) -> _Distances | None:
     along = apart / np.linalg.norm(apart, axis=2, keepdims=True)
     values = (np.diff(residual.reshape(frames, -1, 2), axis=1) * along).sum(axis=2)
     part = np.linspace(-1, 1, frames)
-    free = np.column_stack([np.ones(frames), part, part**2, *gait_waves(trial, HARMONICS)])
+    free = np.column_stack([np.ones(frames), part, part**2, *gait_waves(trial, COLOURED_NOISE.harmonics)])
     return _Distances(trial.time_s, values, free)
 
 

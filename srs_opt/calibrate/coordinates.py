@@ -9,12 +9,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from srs_opt.calibrate.fit_settings import PRIOR
 from srs_opt.model.parameters import COMPLIANCE_PARAMETERS
 from srs_opt.robot import Robot
 
 INFINITY = math.inf
 FRICTION_SPEED = "friction_speed_m_s"
-FRICTION_SPEED_RANGE_M_S = (0.0003, 0.003)
 # standard deviations assumed for what the robot file gives none (relative)
 ASSUMED_SD = {
     "friction_tangential": 0.10,
@@ -28,9 +28,6 @@ SCATTER_SD = {
     "friction_normal": 0.03,
     "curvature_per_pressure_1_m_kpa": 0.01,
 }
-# Prior deviation (relative) of a value that the robot file fixes: far below what any data could resolve
-# (about 1e-4), so that tenfold either way changes no answer.
-FIXED_SD = 1e-9
 
 
 @dataclass(frozen=True)
@@ -66,7 +63,7 @@ class Coordinate:
     @property
     def fixed(self) -> bool:
         """Whether the fit leaves it where it is; trials may still scatter about it."""
-        return self.prior_sd <= FIXED_SD
+        return self.prior_sd <= PRIOR.fixed_sd
 
     @property
     def reported(self) -> bool:
@@ -79,17 +76,17 @@ def base_coordinates(robot: Robot) -> tuple[Coordinate, ...]:
 
     The stiffness of a body that bends under load is among them where it has one.
 
-    A deviation of 0 fixes a parameter. One that trials scatter about stays a coordinate (`FIXED_SD`): the
-    scatter needs its slopes.
+    A deviation of 0 fixes a parameter. One that trials scatter about stays a coordinate, with
+    `PriorSettings.fixed_sd`: the scatter needs its derivatives.
     """
     sds = {**ASSUMED_SD, **robot.relative_sd}
     free = {n for n, sd in sds.items() if sd > 0 and n in _CALIBRATED and (getattr(robot, n) or 0) > 0}
     chosen = [
-        Coordinate(name, prior_sd=sds[name] if name in free else FIXED_SD)
+        Coordinate(name, prior_sd=sds[name] if name in free else PRIOR.fixed_sd)
         for name in _CALIBRATED
         if name in free or name in SCATTER_SD
     ]
-    low, high = (math.log(v / robot.friction_speed_m_s) for v in FRICTION_SPEED_RANGE_M_S)
+    low, high = (math.log(v / robot.friction_speed_m_s) for v in PRIOR.friction_speed_range_m_s)
     speed = Coordinate(FRICTION_SPEED, prior_sd=(high - low) / 2, start=(high + low) / 2, lower=low - 0.2)
     return (*chosen, speed)
 

@@ -9,16 +9,8 @@ import math
 
 import numpy as np
 
+from srs_opt.calibrate.data_settings import ENTRY
 from srs_opt.measurement.records import Trial
-
-LEAST_MARKERS, LEAST_CYCLES = 4, 2.0
-FREQUENCIES_HZ = (0.15, 8.0)
-OFF = 0.08  # share by which the frequency may be off; a valve clock is off by a thousandth
-# share of the swing's power at the best frequency that the entered one may show. Of a wrong one it shows
-# 0.05 and less; the first two cycles, from rest, smear the right one to 0.9.
-SHOWS = 0.3
-OFF_PHASE_RAD = 1.0  # of the lag between neighbouring joints; slow valves and bent segments make 0.3
-EVEN_RAD = 0.5  # how well the joints' lags must agree to mean anything
 
 
 def contradicted(trial: Trial) -> str:
@@ -28,18 +20,21 @@ def contradicted(trial: Trial) -> str:
         return ""
     time, turns = swing
     duration, entered = float(time[-1] - time[0]), trial.frequency_hz
-    highest = min(FREQUENCIES_HZ[1], 0.25 / float(np.median(np.diff(time))))
-    tried = np.arange(FREQUENCIES_HZ[0], max(highest, 2 * entered), 0.25 / duration)
+    highest = min(ENTRY.frequencies_hz[1], 0.25 / float(np.median(np.diff(time))))
+    tried = np.arange(ENTRY.frequencies_hz[0], max(highest, 2 * entered), 0.25 / duration)
     power = np.array([_power(time, turns, f)[0] for f in tried])
     best = float(tried[int(np.argmax(power))])
     own, waves = _power(time, turns, entered)
-    if abs(best - entered) > max(OFF * entered, 0.6 / duration) and own < SHOWS * power.max():
+    if (
+        abs(best - entered) > max(ENTRY.most_off_share * entered, 0.6 / duration)
+        and own < ENTRY.least_power_share * power.max()
+    ):
         return f"the body swings at {best:.2g} Hz, not at the {entered:.3g} Hz that are entered"
     lags = np.angle(waves[1:] * np.conj(waves[:-1]))
     mean = np.angle(np.exp(1j * lags).sum())
-    even = np.abs(np.angle(np.exp(1j * (lags - mean)))).max() < EVEN_RAD
+    even = np.abs(np.angle(np.exp(1j * (lags - mean)))).max() < ENTRY.even_rad
     off = abs(np.angle(np.exp(1j * (mean - trial.phase_lag_rad))))
-    if even and off > OFF_PHASE_RAD:
+    if even and off > ENTRY.most_off_phase_rad:
         entered_rad = trial.phase_lag_rad
         return (
             f"segments follow each other by {mean:+.2f} rad, not by the {entered_rad:+.2f} that are entered"
@@ -51,11 +46,11 @@ def _swing(trial: Trial) -> tuple[np.ndarray, np.ndarray] | None:
     """Return times (n,) and the body's turns at its joints (n, J); None where they do not tell a gait."""
     markers = trial.markers_m
     plain = trial.kind == "gait" and trial.schedule is None and trial.applied is None and trial.spots is None
-    if not plain or markers is None or markers.shape[1] < LEAST_MARKERS or trial.frequency_hz <= 0:
+    if not plain or markers is None or markers.shape[1] < ENTRY.least_markers or trial.frequency_hz <= 0:
         return None
     whole = np.isfinite(markers).all(axis=(1, 2))
     time = trial.time_s[whole]
-    if time.size < 40 or (time[-1] - time[0]) * trial.frequency_hz < LEAST_CYCLES:
+    if time.size < 40 or (time[-1] - time[0]) * trial.frequency_hz < ENTRY.least_cycles:
         return None
     chords = np.diff(markers[whole], axis=1) @ np.array([1, 1j])
     turns = np.angle(chords[:, 1:] * np.conj(chords[:, :-1]))

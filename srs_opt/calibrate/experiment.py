@@ -13,13 +13,11 @@ from srs_opt.calibrate.instruments import NAME, reading_equations, readings
 from srs_opt.calibrate.model import Model
 from srs_opt.calibrate.noise import Noise, track_of
 from srs_opt.calibrate.normal_equations import NormalEquations
-from srs_opt.calibrate.trial_simulation import tolerance_for
+from srs_opt.calibrate.trial_simulation import TRIAL, tolerance_for
 from srs_opt.calibrate.trials import Extra, Point, Request, Trials
 from srs_opt.errors import NoAnswerError
 from srs_opt.measurement.records import Bench, Trial
 from srs_opt.parallel import HERE, Executor
-
-MOST_KEPT = 1_200_000  # measured values up to which slopes and motions are kept: some 300 MB
 
 
 class Experiment:
@@ -52,7 +50,7 @@ class Experiment:
         self.noise = noise if isinstance(noise, Noise) else Noise(noise)
         self.readings = readings(model, bench) if bench is not None else ()
         count = sum(track.size for track in map(track_of, self.trials) if track is not None)
-        self.keeps = count <= MOST_KEPT
+        self.keeps = count <= TRIAL.most_kept_values
         tolerance = tolerance_for(count, self.noise.white_sd_m)
         self.work = Trials(model, self.trials, self.noise, tolerance, keeps=self.keeps)
         ordered = [sorted(group, key=lambda t: -t.frequency_hz) for group in groups or (self.trials,)]
@@ -105,7 +103,7 @@ class Experiment:
     ) -> dict[str, NormalEquations]:
         """Return the normal equations of several trials.
 
-        With `stale` the slopes may be those of the last request for the same coordinates, which costs a
+        With `stale` the derivatives may be those of the last request for the same coordinates, which costs a
         fifth; the residuals are always those at `point`. With `rough` motions are good enough for a model
         that leaves a plain misfit.
 

@@ -11,14 +11,13 @@ import numpy as np
 
 from srs_opt.calibrate.coordinates import SCATTER_SD, Coordinate
 from srs_opt.calibrate.experiment import Point
+from srs_opt.calibrate.fit_settings import FIT, OBJECTIVE
 from srs_opt.calibrate.normal_equations import NormalEquations
 from srs_opt.calibrate.objective import (
-    AHEAD,
-    CORRELATED,
     Move,
-    bent_move,
     best_move,
     excess_of,
+    geodesic_move,
     misfit_ratio,
     newton_step,
     objective,
@@ -28,22 +27,6 @@ from srs_opt.calibrate.objective import (
 from srs_opt.errors import NoAnswerError
 from srs_opt.measurement.records import Trial
 
-ITERATIONS = 12
-CONVERGED = 0.05  # of the deviance: a fifth of a standard deviation
-# deviance, and share of it, that even the linearisation promises to stay behind the one to beat
-HOPELESS, HOPELESS_SHARE = 300.0, 0.1
-TRIED = 2  # iterations before that is believed
-TRUSTED = 0.25  # of the gain that derivatives promise: with no larger error they serve for the next step too
-PLAIN = 25.0  # variance inflation above which a misfit hides the errors of a simulation five times as rough
-PLAINLY = 0.01  # share of such a misfit that need not be gained
-CRAWL = 0.03  # share of the misfit; derivatives of an earlier point that promise less are not worth a step
-FAR_OFF = 3.0  # variance inflation from which on a fit does not explain the data
-LEAST_DAMPING = 0.001  # below: none
-FIRST_DAMPING = 0.02
-IDLE, MOST_DAMPING = 2, 1e4  # steps that gain nothing, and damping, at which a fit is given up
-TAKEN_BACK = (0.5, 0.2, 0.0)  # parts of a step that a trial's scatter may go instead
-FEW_ASTRAY = 3  # where no more than a third of the trials went astray: else the step was too long
-JITTER = 2e-5  # deviance per measured value that a new mesh of the integration may cost
 Report = Callable[[str], None]
 
 
@@ -127,10 +110,10 @@ def fit(
     coordinates: Sequence[Coordinate],
     start: Point | None = None,
     trials: Sequence[Trial] | None = None,
-    iterations: int = ITERATIONS,
+    iterations: int | None = None,
     report: Report | None = None,
     beat: float = math.inf,
-    correlated: float = CORRELATED,
+    correlated: float | None = None,
     near: float = 0.0,
     *,
     rough: bool = False,
@@ -148,8 +131,8 @@ def fit(
     correlated : float
         Values that a misfit makes count as one: see `variance_inflation_of`.
     near : float
-        Share of the misfit beyond the noise that a fit far off may leave to be gained and still count as
-        converged: what does not explain the data need not be known well.
+        Share of the misfit beyond the noise that a fit which does not explain the data may leave to be gained
+        and still count as converged: its values need not be known well.
     rough : bool
         Whether the fit may end with derivatives of an earlier point, its covariance with them.
 
@@ -159,6 +142,8 @@ def fit(
         If not even the starting point can be simulated.
     """
     coordinates = tuple(coordinates)
+    iterations = FIT.iterations if iterations is None else iterations
+    correlated = OBJECTIVE.correlated_values if correlated is None else correlated
     point = start_point(coordinates)
     if start is not None:
         names = {c.name for c in coordinates}
@@ -193,8 +178,8 @@ class _Descent:
         self.done, self.idle, self.damping = 0, 0, 0.0
         self.converged, self.behind, self.rough = False, math.inf, True
         self.reached = math.nan  # deviance after the last step
-        self.bends = True  # until derivatives turn out not to be kept
-        self.winding = False  # whether the last step found the valley bent
+        self.keeps = True  # until derivatives turn out not to be kept
+        self.nonlinear = False  # whether the last step gained something else than the derivatives promised
 
     def begin(self, point: Point) -> None:
         """Linearise where the fit starts, roughly where the misfit is plain."""
@@ -202,14 +187,14 @@ class _Descent:
         # the scatter's derivatives alone tell, for a third of the time
         few = [c for c in self.coordinates if c.name in SCATTER_SD] or self.coordinates
         first = self.experiment.normal_equations(point, few, self.trials, rough=True)
-        self.rough = variance_inflation_of(first, self.correlated) > PLAIN
+        self.rough = variance_inflation_of(first, self.correlated) > FIT.rough_inflation
         self.refresh()
         self.at_start = misfit_ratio(self.equations)
 
     def refresh(self) -> None:
         """Take the derivatives anew, from a fine simulation once the misfit does not hide a rough one."""
         self.equations = self._measured(self.point)
-        if self.rough and self.variance_inflation <= PLAIN:
+        if self.rough and self.variance_inflation <= FIT.rough_inflation:
             self.rough = False
             self.equations = self._measured(self.point)
 
@@ -233,7 +218,8 @@ class _Descent:
     def jitter(self) -> float:
         """Deviance below which a loss is the integration's."""
         return max(
-            CONVERGED, JITTER * sum(g.count for g in self.equations.values()) / self.variance_inflation
+            FIT.converged_deviance,
+            FIT.jitter_per_value * sum(g.count for g in self.equations.values()) / self.variance_inflation,
         )
 
     def now(self) -> float:
@@ -249,12 +235,12 @@ class _Descent:
     def arrived(self) -> bool:
         """Whether fresh derivatives promise to gain next to nothing."""
         while True:
-            enough, inflation = CONVERGED, self.variance_inflation
-            if inflation > FAR_OFF:
-                near = max(self.near, PLAINLY) if inflation > PLAIN else self.near
-                enough = max(CONVERGED, near * excess_of(self.equations) / inflation)
+            enough, inflation = FIT.converged_deviance, self.variance_inflation
+            if inflation > FIT.unexplained_inflation:
+                near = max(self.near, FIT.rough_gain_share) if inflation > FIT.rough_inflation else self.near
+                enough = max(FIT.converged_deviance, near * excess_of(self.equations) / inflation)
             if self.stale:
-                enough = max(enough, CRAWL * excess_of(self.equations) / inflation)
+                enough = max(enough, FIT.stale_gain_share * excess_of(self.equations) / inflation)
             if self.missing() >= enough:
                 return False
             if not self.stale:
@@ -264,7 +250,7 @@ class _Descent:
 
     def spent(self, iterations: int) -> bool:
         """Whether to give up; what the integration's jitter hides then still counts as converged."""
-        if self.done < iterations and self.idle < IDLE and self.damping <= MOST_DAMPING:
+        if self.done < iterations and self.idle < FIT.most_idle and self.damping <= FIT.most_damping:
             return False
         self.converged = not self.stale and self.missing() < self.jitter
         return True
@@ -275,47 +261,53 @@ class _Descent:
         stale, inflation, now, jitter = self.stale, self.variance_inflation, self.now(), self.jitter
         move = best_move(self.coordinates, self.equations, self.point, inflation, self.damping)
         try:
-            if self.winding and self.bends and not stale:
-                move = self._bent(move)
+            if self.nonlinear and self.keeps and not stale:
+                move = self._accelerated(move)
             moved = _moved(self.point, self.coordinates, move)
             equations = self._measured(moved, stale=True)
             before, after = (self.point, self.equations), (moved, equations)
-            moved = self._tamed(before, after, inflation)
+            moved = self._scatter_limited(before, after, inflation)
             gain = now - objective(self.coordinates, equations, moved, inflation)
         except NoAnswerError:
             gain = -math.inf
         if gain > -jitter:
-            self.idle = self.idle + 1 if gain < CONVERGED and self.damping < 1 and not stale else 0
+            self.idle = (
+                self.idle + 1 if gain < FIT.converged_deviance and self.damping < 1 and not stale else 0
+            )
             self.point, self.equations = moved, equations
-            self._ease(gain, move.promised)
-            off = abs(gain - move.promised) > TRUSTED * move.promised
-            self.winding = off
-            if off or (self.rough and self.variance_inflation <= PLAIN):
+            self._adapt_damping(gain, move.promised)
+            off = abs(gain - move.promised) > FIT.trusted_share * move.promised
+            self.nonlinear = off
+            if off or (self.rough and self.variance_inflation <= FIT.rough_inflation):
                 self.refresh()
         elif stale:
-            self.winding = True
+            self.nonlinear = True
             self.refresh()
         else:
-            self.winding = True
-            self.damping = max(self.damping * 4, FIRST_DAMPING)
+            self.nonlinear = True
+            self.damping = max(self.damping * 4, FIT.first_damping)
 
-    def _ease(self, gain: float, promised: float) -> None:
+    def _adapt_damping(self, gain: float, promised: float) -> None:
         """Damp less where the derivatives were right, more where they were not."""
-        if gain < TRUSTED * promised:
+        if gain < FIT.trusted_share * promised:
             self.damping *= 2
-        elif gain > (1 - TRUSTED) * promised:
-            self.damping = 0.0 if self.damping < LEAST_DAMPING else self.damping * 0.3
+        elif gain > (1 - FIT.trusted_share) * promised:
+            self.damping = 0.0 if self.damping < FIT.least_damping else self.damping * 0.3
 
-    def _bent(self, move: Move) -> Move:
-        """Return the step with the valley's bend followed."""
-        short = replace(move, step=AHEAD * move.step, scatter={n: AHEAD * b for n, b in move.scatter.items()})
+    def _accelerated(self, move: Move) -> Move:
+        """Return the step with the second derivative along it taken into account."""
+        short = replace(
+            move,
+            step=OBJECTIVE.probe_share * move.step,
+            scatter={n: OBJECTIVE.probe_share * b for n, b in move.scatter.items()},
+        )
         there = _moved(self.point, self.coordinates, short)
         ahead = self._measured(there, stale=True)
-        self.bends = any(g.stale for g in ahead.values())
+        self.keeps = any(g.stale for g in ahead.values())
         own = self.coordinates, self.equations, ahead, self.point, self.variance_inflation, self.damping
-        return bent_move(*own, move) if self.bends else move
+        return geodesic_move(*own, move) if self.keeps else move
 
-    def _tamed(
+    def _scatter_limited(
         self,
         before: tuple[Point, Mapping[str, NormalEquations]],
         after: tuple[Point, dict[str, NormalEquations]],
@@ -337,13 +329,17 @@ class _Descent:
             normal = equations[name]
             now = point.scatter.get(name, np.zeros_like(normal.scatter_sd))
             expected = normal.after(step, moved.scatter[name] - now, inflation)
-            margin = 1 + JITTER * normal.count / inflation + TRUSTED * abs(own(normal) - expected)
+            margin = (
+                1
+                + FIT.jitter_per_value * normal.count / inflation
+                + FIT.trusted_share * abs(own(normal) - expected)
+            )
             allowed[name] = expected + margin
         scatter = dict(moved.scatter)
-        for part in TAKEN_BACK:
+        for part in FIT.scatter_parts:
             known = [t for t in self.trials if t.name in allowed]
             astray = [t for t in known if own(new_equations[t.name]) > allowed[t.name]]
-            if not 0 < len(astray) <= len(allowed) // FEW_ASTRAY:
+            if not 0 < len(astray) <= len(allowed) // FIT.trials_per_astray:
                 break
             tried = dict(scatter)
             for t in astray:
@@ -364,8 +360,10 @@ class _Descent:
         """
         now = objective(self.coordinates, self.equations, self.point, 1.0)
         excess = within_reach(self.coordinates, self.equations, self.point) - beat
-        far = max(HOPELESS, HOPELESS_SHARE * abs(beat)) if math.isfinite(beat) else math.inf
-        late = self.done >= TRIED and excess > far and excess > 0.5 * self.behind
+        far = max(FIT.hopeless_deviance, FIT.hopeless_share * abs(beat)) if math.isfinite(beat) else math.inf
+        late = (
+            self.done >= FIT.least_iterations and excess > far and excess > FIT.catch_up_share * self.behind
+        )
         gained, self.reached = self.reached - now, now
         self.behind = excess
         return late and not gained > now - beat

@@ -16,10 +16,9 @@ from typing import Any
 import casadi as ca
 
 from srs_opt.calibrate.coordinates import INFINITY, Coordinate
+from srs_opt.calibrate.fit_settings import PRIOR
 from srs_opt.effects.effect import Effect
 from srs_opt.effects.parameter import Direction, EffectParameter, Place, Scale, Towards
-
-LOG_TYPICAL = 0.3  # change of a logarithm that begins to matter
 
 
 @dataclass(frozen=True)
@@ -79,7 +78,7 @@ class Form:
             found.append(("nearness", -math.log(self._distance()), 0.7))
         name = self.effect.name
         return tuple(
-            Coordinate(self.name(f"log_{part}"), name, LOG_TYPICAL, -INFINITY, spread, start, log=True)
+            Coordinate(self.name(f"log_{part}"), name, PRIOR.log_typical, -INFINITY, spread, start, log=True)
             for part, start, spread in found
         )
 

@@ -11,6 +11,7 @@ import casadi as ca
 import numpy as np
 
 from srs_opt.calibrate.coordinates import SCATTER_SD, Coordinate
+from srs_opt.calibrate.fit_settings import PRIOR
 from srs_opt.calibrate.model import Conditions, Model, Values
 from srs_opt.calibrate.normal_equations import NormalEquations
 from srs_opt.effects import known_effects
@@ -23,7 +24,6 @@ from srs_opt.model.parameters import Structure, effect_symbols
 from srs_opt.model.registry import build
 
 NAME = "(bench)"  # stands among the trials' names
-TOW_SD_N = 0.002
 
 
 @dataclass(frozen=True)
@@ -67,19 +67,19 @@ def _instrument_readings(
         if effect.camera:
             seen_x, seen_y = effect.camera(own[effect.name], seen_x, seen_y)
     across = ca.Function("across", [x, y, camera], [ca.jacobian(seen_y, y)])
-    slope = ca.SX(0)
+    tilt = ca.SX(0)
     state = _resting(m)
     for effect, e in parameters.effects:
         if effect.link_force and effect.knows_the_room and not effect.of_tether:
             fx, fy = effect.link_force(e, state)
-            slope = slope + ca.vertcat(fx[0], fy[0]) / (m.mass[0] * parameters["gravity_m_s2"])
-    steep = ca.sqrt(ca.sumsqr(slope) + 1e-24)
+            tilt = tilt + ca.vertcat(fx[0], fy[0]) / (m.mass[0] * parameters["gravity_m_s2"])
+    sine = ca.sqrt(ca.sumsqr(tilt) + 1e-24)
     assert isinstance(m, CompliantModel)
     scene = Scene(
         load_n=m.normal_force(),
         magnification=lambda at_m: across(at_m, 0, camera),
         clock_s=clock,
-        floor_rad=ca.asin(steep),
+        floor_rad=ca.asin(sine),
         flexibility_1_n_m2=1 / m.stiffness(),
         parameter=lambda name: parameters[name],
     )
@@ -110,7 +110,7 @@ def _check(check: Check, expected: Callable[[Values], float]) -> Reading:
 def _tow(model: Model, test: TowTest) -> Reading:
     """Return a tow test's reading; every pull has its own friction, as every trial has."""
     conditions = Conditions(0.0, 1.0, test.with_tether)
-    sd = math.hypot(TOW_SD_N, SCATTER_SD["friction_tangential"] * test.force_n)
+    sd = math.hypot(PRIOR.tow_sd_n, SCATTER_SD["friction_tangential"] * test.force_n)
 
     # in which direction of the room the robot was towed is not recorded
     level = {c.name: 0.0 for f in model.forms for c in f.sizes if f.effect.name in _of_the_floor()}

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from srs_opt.calibrate.coordinates import SCATTER_SD, Coordinate, base_coordinates
+from srs_opt.calibrate.data_settings import MAP_DATA
 from srs_opt.calibrate.experiment import Experiment, Point
 from srs_opt.calibrate.fit import fit, start_point
 from srs_opt.calibrate.forms import form_of_entry
@@ -24,11 +25,6 @@ from srs_opt.orbit.body import integrator
 from srs_opt.orbit.sensitivity import sensitivity
 from srs_opt.orbit.steady import Orbit, steady_gaits
 from srs_opt.robot import Robot
-
-LEAST_SD = np.array([1e-4, 0.01])  # speed in m/s, path's curvature in 1/m
-STRAIGHT_SD_1_M = 0.06  # of the path's curvature where a map only says "straight": radii beyond 10 m
-TRACK_S = 8.0  # length of the tracks that maps are compared with
-TRACKS = 12  # simulated for that, at most
 
 
 def fit_maps(
@@ -76,8 +72,10 @@ class Maps:
         names = [c.name for c in base]
         scattered = [names.index(n) for n in SCATTER_SD]
         spread = {k: jacobian[:, scattered] * list(SCATTER_SD.values()) for k, (_, jacobian) in bench.items()}
-        own = _own_variance(self.rows, spread)
-        self._whitening = {k: np.linalg.inv(_root(row, spread[k], own)) for k, row in self.rows.items()}
+        own = _own_variance(self.rows, spread, self.robot.length_m)
+        self._whitening = {
+            k: np.linalg.inv(_root(row, spread[k], own, self.robot.length_m)) for k, row in self.rows.items()
+        }
 
     def normal_equations(
         self,
@@ -188,7 +186,9 @@ def _measured(row: MapRow) -> np.ndarray:
     return np.array([row.speed_m_s, 0.0 if row.radius_m is None else 1 / row.radius_m])
 
 
-def _own_variance(rows: Mapping[int, MapRow], spread: Mapping[int, np.ndarray]) -> np.ndarray:
+def _own_variance(
+    rows: Mapping[int, MapRow], spread: Mapping[int, np.ndarray], length_m: float
+) -> np.ndarray:
     """Return the variance (2,) of one run that the scatter of friction and curvature does not explain.
 
     Pooled over all rows: from a few replicates alone a deviation is hardly known.
@@ -199,15 +199,16 @@ def _own_variance(rows: Mapping[int, MapRow], spread: Mapping[int, np.ndarray]) 
         for i, sd in enumerate(stated):
             if sd > 0:
                 excess[i].append(sd**2 - float(spread[k][i] @ spread[k][i]))
+    least = np.array([MAP_DATA.least_speed_sd * length_m, MAP_DATA.least_curvature_sd / length_m])
     pooled = np.array([np.mean(e) if e else 0.0 for e in excess])
-    return np.asarray(np.maximum(pooled, LEAST_SD**2))
+    return np.asarray(np.maximum(pooled, least**2))
 
 
-def _root(row: MapRow, scatter: np.ndarray, own: np.ndarray) -> np.ndarray:
+def _root(row: MapRow, scatter: np.ndarray, own: np.ndarray, length_m: float) -> np.ndarray:
     """Return the Cholesky factor of a row's covariance: that of one run over the number of replicates."""
     covariance = (scatter @ scatter.T + np.diag(own)) / max(row.replicates, 1)
     if row.radius_m is None:
-        covariance[1, 1] += STRAIGHT_SD_1_M**2
+        covariance[1, 1] += (MAP_DATA.straight_curvature_sd / length_m) ** 2
     return np.asarray(np.linalg.cholesky(covariance))
 
 
@@ -215,13 +216,13 @@ def _sd_with_tracks(
     dataset: DataSet, model: str | None, base: Sequence[Coordinate], point: Point
 ) -> dict[str, float]:
     """Return the deviations that one track of every gait, as the data set's camera sees it, would leave."""
-    rows = dataset.maps[:: math.ceil(len(dataset.maps) / TRACKS)]
-    time_s = np.arange(round(TRACK_S * dataset.rate_hz)) / dataset.rate_hz
+    rows = dataset.maps[:: math.ceil(len(dataset.maps) / MAP_DATA.tracks)]
+    time_s = np.arange(round(MAP_DATA.track_s * dataset.rate_hz)) / dataset.rate_hz
     blank = np.zeros((time_s.size, dataset.robot.links, 2))
     trials = [
         Trial(
-            f"map row {k}", row.frequency_hz, row.pressure_kpa, row.offset, row.phase_lag_rad, 0.0, TRACK_S,
-            time_s, blank,
+            f"map row {k}", row.frequency_hz, row.pressure_kpa, row.offset, row.phase_lag_rad, 0.0,
+            MAP_DATA.track_s, time_s, blank,
         )
         for k, row in enumerate(rows)
     ]  # fmt: skip

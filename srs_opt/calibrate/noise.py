@@ -10,12 +10,11 @@ from math import comb
 
 import numpy as np
 
+from srs_opt.calibrate.data_settings import WHITE_NOISE
 from srs_opt.measurement.noise import MAD
 from srs_opt.measurement.records import DataSet, Trial
 
 ORDER = 4
-_LEAST = 50  # differences that an estimate needs
-_WILD = 5.0  # robust standard deviations beyond which a difference is a jump, not noise
 
 
 @dataclass(frozen=True)
@@ -80,10 +79,10 @@ def _white_sd_m(dataset: DataSet) -> float:
             differences = np.diff(track, ORDER, axis=0).ravel()
             found.append(differences[np.isfinite(differences)])
     pooled = np.concatenate(found) if found else np.zeros(0)
-    if pooled.size < _LEAST:
+    if pooled.size < WHITE_NOISE.least_differences:
         return dataset.marker_sd_m
     gain = np.sqrt(comb(2 * ORDER, ORDER))
     size = np.abs(pooled)
     usual = np.median(size) / MAD
-    sd = float(np.sqrt(np.mean(size[size <= _WILD * usual] ** 2)) / gain)
+    sd = float(np.sqrt(np.mean(size[size <= WHITE_NOISE.jump_sd * usual] ** 2)) / gain)
     return sd if sd > 0 else dataset.marker_sd_m

@@ -12,9 +12,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from srs_opt.calibrate.fit_settings import OBJECTIVE
 from srs_opt.calibrate.whiten import Whitening, serial_correlation
-
-RANK = 1e-12  # of the largest eigenvalue of scaled normal equations; below it a direction is unknown
 
 
 @dataclass(frozen=True)
@@ -115,10 +114,13 @@ class NormalEquations:
         back = (self.scatter_now + moved) / self.scatter_sd**2
         return np.asarray(-(self.raw[list(self.scattered)] @ both) / inflation - back)
 
-    def bent(
+    def acceleration(
         self, ahead: NormalEquations, step: np.ndarray, moved: np.ndarray, share: float
     ) -> NormalEquations:
-        """Return equations whose solution undoes the bend of the prediction along a step and a move.
+        """Return equations whose solution is the geodesic acceleration along a step and a move.
+
+        Their residual is the second directional derivative of the prediction, by a finite difference: 2/s^2
+        times (residual at s times the step, less what the first derivatives say), s the share.
 
         Parameters
         ----------
@@ -190,7 +192,9 @@ def trial_normal_equations(
         scale = 1 / np.sqrt(np.maximum(np.diag(raw)[size:], 1e-300))
         inner = raw[size:, size:] * scale[:, None] * scale + np.diag((scale / own_sd) ** 2)
         # columns that were nowhere seen have no part in anything
-        back = np.linalg.pinv(inner, rcond=RANK, hermitian=True) @ (scale[:, None] * raw[size:, :size])
+        back = np.linalg.pinv(inner, rcond=OBJECTIVE.least_eigenvalue, hermitian=True) @ (
+            scale[:, None] * raw[size:, :size]
+        )
         left = left - both[:, size:] @ (scale * back[:, -1])
         raw = raw[:size, :size] - (scale[:, None] * raw[size:, :size]).T @ back
         raw = (raw + raw.T) / 2
@@ -230,7 +234,7 @@ def solve(total: np.ndarray, chosen: Sequence[int], precision: np.ndarray, offse
     a = total[np.ix_(index, index)] + np.diag(precision[index])
     g = total[index, -1] - precision[index] * offset[index]
     scale = 1 / np.sqrt(np.maximum(np.diag(a), 1e-300))
-    inverse = np.linalg.pinv(a * scale[:, None] * scale, rcond=RANK, hermitian=True)
+    inverse = np.linalg.pinv(a * scale[:, None] * scale, rcond=OBJECTIVE.least_eigenvalue, hermitian=True)
     inverse *= scale[:, None] * scale
     step = inverse @ g
     deviance = float(total[-1, -1] + np.sum(precision * offset**2) - g @ step)
@@ -261,7 +265,7 @@ def bounded_solve(
     # so that the rank is judged alike for all coordinates; directions without information are left out.
     scale = 1 / np.sqrt(np.maximum(np.diag(a), 1e-300))
     values, vectors = np.linalg.eigh(a * scale[:, None] * scale)
-    kept = values > RANK * values[-1]
+    kept = values > OBJECTIVE.least_eigenvalue * values[-1]
     root = np.sqrt(values[kept])
     factor = root[:, None] * vectors[:, kept].T
     target = (vectors[:, kept].T @ (scale * g)) / root

@@ -10,14 +10,8 @@ import numpy as np
 
 from srs_opt.calibrate.coordinates import Coordinate
 from srs_opt.calibrate.experiment import Point
+from srs_opt.calibrate.fit_settings import OBJECTIVE
 from srs_opt.calibrate.normal_equations import NormalEquations, Solution, bounded_solve
-
-CORRELATED = 100.0  # values of a track that a smooth misfit makes count as one
-LONGEST_LOG_STEP = 0.7
-MOST_SCATTER = 5.0  # standard deviations that a trial's own friction and curvature may have
-AHEAD = 0.1  # share of a step at which its bend is looked at
-MOST_BEND = 0.75  # length of the acceleration over that of the step
-HELD = 12  # rounds of finding out whose scatter is at its limit
 
 
 def priors(coordinates: Sequence[Coordinate], point: Point) -> tuple[np.ndarray, np.ndarray]:
@@ -32,14 +26,15 @@ def misfit_ratio(equations: Mapping[str, NormalEquations]) -> float:
     return sum(g.misfit for g in equations.values()) / sum(g.count for g in equations.values())
 
 
-def variance_inflation_of(equations: Mapping[str, NormalEquations], correlated: float = CORRELATED) -> float:
+def variance_inflation_of(equations: Mapping[str, NormalEquations], correlated: float | None = None) -> float:
     """Return the factor on the noise variance that a misfit calls for.
 
     What a wrong model leaves behind is smooth in time and alike over the markers, so that `correlated` values
     count as one; without this, thousands of frames would pull the parameters far from their bench values.
     """
+    correlated = OBJECTIVE.correlated_values if correlated is None else correlated
     count, ratio = sum(g.count for g in equations.values()), misfit_ratio(equations)
-    return 1 + correlated * max(0.0, ratio - 1 - 4 * math.sqrt(2 / count))
+    return 1 + correlated * max(0.0, ratio - 1 - OBJECTIVE.inflation_sd * math.sqrt(2 / count))
 
 
 def objective(
@@ -94,15 +89,16 @@ def best_move(
     point: Point,
     inflation: float,
     damping: float = 0.0,
-    longest: float = LONGEST_LOG_STEP,
+    longest: float | None = None,
 ) -> Move:
     """Return the step to the minimum that the derivatives promise, the scatter within its limits.
 
     A trial whose scatter would leave its limits has it held there, and the shared coordinates know: a model
     that lacks something drives scatter that far, and a step that counts on more of it would only lose.
     """
+    longest = OBJECTIVE.longest_log_step if longest is None else longest
     held: dict[str, np.ndarray] = {}
-    for _ in range(HELD):
+    for _ in range(OBJECTIVE.held_rounds):
         parts = {n: g.eliminated(inflation, held.get(n), damping) for n, g in equations.items()}
         step = _solved(coordinates, [e.matrix for e in parts.values()], point, damping).step
         for k, c in enumerate(coordinates):
@@ -120,7 +116,7 @@ def best_move(
     return Move(step, scatter, promised)
 
 
-def bent_move(
+def geodesic_move(
     coordinates: tuple[Coordinate, ...],
     equations: Mapping[str, NormalEquations],
     ahead: Mapping[str, NormalEquations],
@@ -129,13 +125,15 @@ def bent_move(
     damping: float,
     move: Move,
 ) -> Move:
-    """Return the step along the valley's bend: half the geodesic acceleration on top.
+    """Return the step with half the geodesic acceleration added: it follows a curved valley.
 
     After Transtrum and Sethna (2012), doi 10.48550/arXiv.1201.5885. `ahead` are the normal equations where
-    AHEAD of the step leads, with the derivatives of the point.
+    `probe_share` of the step leads, with the derivatives of the point.
     """
     bent = {
-        n: g.bent(ahead[n], move.step, b, AHEAD) for n, (g, b) in _pairs(equations, move) if ahead[n].stale
+        n: g.acceleration(ahead[n], move.step, b, OBJECTIVE.probe_share)
+        for n, (g, b) in _pairs(equations, move)
+        if ahead[n].stale
     }
     parts = {n: g.eliminated(inflation, damping=damping) for n, g in bent.items()}
     rest = [g.eliminated(inflation).matrix.copy() for n, g in equations.items() if n not in bent]
@@ -144,11 +142,12 @@ def bent_move(
     free = tuple(replace(c, lower=-math.inf, start=point.values[c.name]) for c in coordinates)
     turn = _solved(free, [*(e.matrix for e in parts.values()), *rest], point, damping).step
     turns = {n: e.back[:, -1] - e.back[:, :-1] @ turn for n, e in parts.items()}
+    # their rule: the acceleration may not be longer than a share of the step, or the series is of no use
     length, size = (
         math.sqrt(sum(g.length2(s, b[n]) for n, g in equations.items() if n in bent))
         for s, b in ((move.step, move.scatter), (turn, turns))
     )
-    share = 0.5 * min(1.0, MOST_BEND * length / max(size, 1e-300))
+    share = 0.5 * min(1.0, OBJECTIVE.most_acceleration * length / max(size, 1e-300))
     lower = np.array([c.lower - point.values[c.name] for c in coordinates])
     step = np.maximum(move.step + share * turn, lower)
     scatter = {n: _within(equations[n], b + share * turns.get(n, 0.0)) for n, b in move.scatter.items()}
@@ -162,7 +161,7 @@ def _pairs(
 
 
 def _within(normal: NormalEquations, moved: np.ndarray) -> np.ndarray:
-    limit = MOST_SCATTER * normal.scatter_sd
+    limit = OBJECTIVE.most_scatter_sd * normal.scatter_sd
     return np.asarray(np.clip(normal.scatter_now + moved, -limit, limit) - normal.scatter_now)
 
 
@@ -171,7 +170,7 @@ def _held(
 ) -> np.ndarray:
     """Return the moves of what leaves its limits, or is held there and drawn further out; else NaN."""
     at = normal.scatter_now + moved
-    at_limit = np.abs(at) >= MOST_SCATTER * normal.scatter_sd * (1 - 1e-9)
+    at_limit = np.abs(at) >= OBJECTIVE.most_scatter_sd * normal.scatter_sd * (1 - 1e-9)
     outwards = (moved != free) | (normal.pull(step, moved, inflation) * at > 0)
     return np.where(at_limit & outwards, moved, np.nan)
 

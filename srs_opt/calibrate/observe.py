@@ -10,6 +10,7 @@ import casadi as ca
 import numpy as np
 
 from srs_opt.calibrate.coordinates import Coordinate
+from srs_opt.calibrate.fit_settings import DERIVATIVE
 from srs_opt.calibrate.mapped import evaluate, mapped
 from srs_opt.calibrate.model import Model, Values
 from srs_opt.calibrate.sensitivity import Variation, onset, variation
@@ -26,9 +27,6 @@ from srs_opt.model.registry import build, state_layout
 from srs_opt.model.state import POSE, VELOCITY, StateLayout
 from srs_opt.simulate.compiled import compiled
 from srs_opt.simulate.interpolate import hermite, linear
-
-# of a typical flexibility: as stiff as that a body moves by 0.1 % other than to first order
-ONSET = 1e-3
 
 
 @dataclass(frozen=True)
@@ -226,10 +224,10 @@ def _onset(
     model: Model, trial: Trial, nodes: Nodes, values: Values, c: Coordinate
 ) -> tuple[Variation, Structure, np.ndarray]:
     """Return the sensitivities to a body's beginning to bend, the bending body and its parameters."""
-    ends = [{**values, c.name: share * ONSET * c.typical} for share in (0.5, 1.0)]
+    ends = [{**values, c.name: share * DERIVATIVE.stiff_share * c.typical} for share in (0.5, 1.0)]
     structure, kept = model.structure(ends[0])
     flexible = tuple(model.pack(end, conditions_of(trial)).p[kept] for end in ends)
-    return onset(structure, nodes, flexible, 0.5 * ONSET * c.typical), structure, flexible[0]
+    return onset(structure, nodes, flexible, 0.5 * DERIVATIVE.stiff_share * c.typical), structure, flexible[0]
 
 
 @lru_cache(maxsize=8)

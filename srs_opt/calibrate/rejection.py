@@ -6,13 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from srs_opt.calibrate.data_settings import USABLE
 from srs_opt.calibrate.entries import contradicted
 from srs_opt.calibrate.noise import track_of
 from srs_opt.measurement.records import Trial
 
 _PASSIVE = ("tow", "push")  # somebody's hand moves the robot: not simulated
-_LEAST_FRAMES, _LEAST_SEEN = 20, 0.3
-MOST_WRONG = 0.34  # share of the trials that may be entered wrongly
 
 
 def rejection_reason(trial: Trial) -> str:
@@ -20,10 +19,10 @@ def rejection_reason(trial: Trial) -> str:
     track = track_of(trial)
     if trial.kind in _PASSIVE:
         return f"kind '{trial.kind}' is not driven by the valves"
-    if track is None or track.shape[0] < _LEAST_FRAMES:
+    if track is None or track.shape[0] < USABLE.least_frames:
         return "too few frames"
     seen = float(np.isfinite(track).mean())
-    if seen < _LEAST_SEEN:
+    if seen < USABLE.least_seen_share:
         return f"only {seen:.0%} of the markers were seen"
     if not np.all(np.diff(trial.time_s) > 0):
         return "its clock does not run forward"
@@ -38,4 +37,4 @@ def left_out(trials: Sequence[Trial]) -> dict[str, str]:
     found = {t.name: why for t in trials if (why := rejection_reason(t))}
     rest = [t for t in trials if t.name not in found]
     wrong = {t.name: why for t in rest if (why := contradicted(t))}
-    return found | wrong if len(wrong) <= MOST_WRONG * len(rest) else found
+    return found | wrong if len(wrong) <= USABLE.most_wrong_share * len(rest) else found

@@ -12,15 +12,13 @@ import numpy as np
 from srs_opt.calibrate.candidates import entry_after
 from srs_opt.calibrate.coordinates import Coordinate
 from srs_opt.calibrate.fit import Fit
+from srs_opt.calibrate.fit_settings import CALIBRATION_REPORT
 from srs_opt.calibrate.noise import Noise
 from srs_opt.result import Result
 from srs_opt.robot import Robot
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-OFF_BENCH = 3.0  # standard deviations of the bench; by chance one value in 370 lies further off
-BLIND = 0.9  # posterior over prior deviation above which the data told nothing
 
 
 @dataclass(frozen=True, repr=False)
@@ -95,7 +93,7 @@ class Calibration(Result):
         """Return a bar per value: its distance from the bench value, in deviations of the bench."""
         from srs_opt.calibrate.figures import bench_figure
 
-        return bench_figure(self, OFF_BENCH)
+        return bench_figure(self, CALIBRATION_REPORT.off_bench_sd)
 
 
 def bench_warnings(off_bench: Mapping[str, float]) -> tuple[str, ...]:
@@ -104,7 +102,7 @@ def bench_warnings(off_bench: Mapping[str, float]) -> tuple[str, ...]:
         f"{name} lies {abs(off):.1f} standard deviations {'above' if off > 0 else 'below'} its bench value: "
         "the bench is wrong, or the value makes up for something that the model lacks"
         for name, off in off_bench.items()
-        if abs(off) > OFF_BENCH
+        if abs(off) > CALIBRATION_REPORT.off_bench_sd
     )
 
 
@@ -146,7 +144,7 @@ def calibration(
 
 
 def unidentifiable(coordinates: list[Coordinate], covariance: np.ndarray) -> tuple[str, ...]:
-    """Return the directions whose posterior deviation is no smaller than BLIND times their prior's.
+    """Return the directions whose posterior deviation is nearly their prior's.
 
     Directions are the eigenvectors of the posterior covariance in units of the priors.
     """
@@ -154,7 +152,7 @@ def unidentifiable(coordinates: list[Coordinate], covariance: np.ndarray) -> tup
     values, vectors = np.linalg.eigh(covariance / prior[:, None] / prior)
     found = []
     for value, vector in zip(values, vectors.T):
-        if math.sqrt(max(value, 0.0)) >= BLIND:
+        if math.sqrt(max(value, 0.0)) >= CALIBRATION_REPORT.uninformed_share:
             parts = [(abs(w), w, c.name) for w, c in zip(vector, coordinates) if abs(w) > 0.3]
             parts.sort(reverse=True)
             sign = math.copysign(1.0, parts[0][1])

@@ -12,6 +12,7 @@ from srs_opt.calibrate.clean import mended
 from srs_opt.calibrate.colour import coloured
 from srs_opt.calibrate.experiment import Experiment
 from srs_opt.calibrate.fit import Fit, fit, start_point
+from srs_opt.calibrate.fit_settings import FIT
 from srs_opt.calibrate.maps import fit_maps
 from srs_opt.calibrate.model import Model
 from srs_opt.calibrate.noise import Noise, noise_of
@@ -22,8 +23,6 @@ from srs_opt.errors import InputError
 from srs_opt.measurement.records import DataSet, Trial
 from srs_opt.parallel import HERE, Executor
 from srs_opt.robot import Robot
-
-REFIT_ITERATIONS = 20
 
 
 def calibrate(
@@ -87,7 +86,7 @@ def _without_odd(experiment: Experiment, found: Fit) -> tuple[Experiment, Fit, d
     def refit(names: Sequence[str]) -> Fit:
         rest = [t for t in experiment.trials if t.name not in names]
         # from the bench's values: what the fit to all found is bent by the very trial that is left out
-        return fit(experiment, coordinates, None, rest, REFIT_ITERATIONS)
+        return fit(experiment, coordinates, None, rest, FIT.refit_iterations)
 
     odd, found = stands_apart(experiment, found, experiment.trials, refit)
     if not odd:

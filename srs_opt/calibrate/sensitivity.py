@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from srs_opt.calibrate.fit_settings import DERIVATIVE
 from srs_opt.calibrate.initial_pose import initial_pose
 from srs_opt.calibrate.trial_simulation import Nodes
 from srs_opt.model.parameters import Structure
@@ -21,10 +22,6 @@ from srs_opt.model.state import POSE, StateLayout
 from srs_opt.simulate.integrate import step_kernel
 from srs_opt.simulate.kernel import LANES, Course, Kernel
 from srs_opt.simulate.rosenbrock import BODY_STATES
-
-# of a coordinate's typical size: rounding then costs 1e-8 of a derivative, the bend of a motion through the
-# steepest friction 1e-4
-HAIR = 1e-7
 
 
 @dataclass(frozen=True)
@@ -56,7 +53,7 @@ def variation(
     with which the nodes were simulated, as long as the effects that tell them apart are absent; `typical`
     (K,) are the coordinates' typical sizes.
     """
-    layout, hair = state_layout(structure), HAIR * typical
+    layout, step = state_layout(structure), DERIVATIVE.perturbation * typical
     start, h = _start(structure, nodes), np.diff(nodes.time_s)
     same = start.size == nodes.start.size
 
@@ -64,7 +61,7 @@ def variation(
         return Course(x, h, nodes.valve, q)
 
     courses = []
-    for off, seed, turn in zip(hair, seeds.T, (initial_pose(structure, p, heading_rad)[1] @ seeds).T):
+    for off, seed, turn in zip(step, seeds.T, (initial_pose(structure, p, heading_rad)[1] @ seeds).T):
         x = start.copy()
         x[POSE] += off * turn
         courses.append(course(x, p + off * seed))
@@ -76,7 +73,7 @@ def variation(
         unmoved = np.concatenate([nodes.body[:, :3], nodes.shape(layout)], axis=1)[..., None]
     else:
         unmoved, moved = moved[..., :1], moved[..., 1:]
-    jacobian = (moved - unmoved) / hair
+    jacobian = (moved - unmoved) / step
     return Variation(jacobian[:, :3], jacobian[:, 3:])
 
 

@@ -14,20 +14,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from srs_opt.calibrate.coordinates import Coordinate
+from srs_opt.calibrate.data_settings import SMOOTH_ERRORS
 from srs_opt.calibrate.experiment import Point
 from srs_opt.calibrate.noise import Noise
 from srs_opt.calibrate.normal_equations import NormalEquations, solve
 from srs_opt.calibrate.objective import priors
-
-# m. The largest is what still counts as an error of the camera's and not as a discovery: twice as much would
-# hide effects at a third of their typical size, half as much would call a camera's usual drift a gap.
-DRIFTS_M = (0.0, 1e-4, 2e-4, 4e-4, 8e-4, 1.5e-3)
-SYSTEMATIC_M = (0.0, 2e-5, 4e-5, 8e-5, 1.5e-4, 3e-4)
-# drop of the deviance from which on they are believed: by chance once in a hundred sets, and then they cost
-# little; with twice as much, drift of half the noise stayed behind when a small effect was found
-CLEARLY = 6.0
-LOOSE = 3.0  # times its typical size: how far an effect is free to go before something counts as noise
-LEFT = 4.0  # deviations of the misfit's sum that may be left when they are believed
 
 
 @dataclass(frozen=True)
@@ -70,20 +61,20 @@ def smooth_part(
         Where they stand.
     """
     precision, offset = priors(coordinates, point)
-    loose = np.array([LOOSE * c.typical for c in coordinates])
+    loose = np.array([SMOOTH_ERRORS.free_sizes * c.typical for c in coordinates])
     precision = np.where(precision > 0, precision, loose**-2.0)
     free = range(len(coordinates))
     count = sum(g.count for g in equations.values())
     tried = {
         (drift, systematic): _deviance(equations, amplitudes, (drift, systematic), free, precision, offset)
-        for drift in DRIFTS_M
-        for systematic in SYSTEMATIC_M
+        for drift in SMOOTH_ERRORS.drifts_m
+        for systematic in SMOOTH_ERRORS.systematic_m
     }
     plain = tried[0.0, 0.0]
     drift, systematic = min(tried, key=lambda key: sum(tried[key]))
     misfit, _ = tried[drift, systematic]
-    explained = misfit < count + LEFT * math.sqrt(2 * count)
-    if not explained or sum(plain) - sum(tried[drift, systematic]) < CLEARLY:
+    explained = misfit < count + SMOOTH_ERRORS.most_left_sd * math.sqrt(2 * count)
+    if not explained or sum(plain) - sum(tried[drift, systematic]) < SMOOTH_ERRORS.detected_deviance:
         return noise
     return replace(noise, drift_m=drift, systematic_m=systematic)
 

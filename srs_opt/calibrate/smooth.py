@@ -9,11 +9,12 @@ import math
 
 import numpy as np
 
+from srs_opt.calibrate.data_settings import SMOOTH_ERRORS
 from srs_opt.calibrate.noise import Noise
 from srs_opt.calibrate.observe import Prediction
+from srs_opt.geometry import quarter_turn, unit_vectors
 from srs_opt.measurement.records import Trial
 
-SHAPES, HARMONICS = 4, 2  # orders along the body, multiples of the gait's frequency
 UNIT = Noise(0.0, drift_m=1.0, systematic_m=1.0)
 DRIFTS = 4  # columns of drift, which come first
 
@@ -34,11 +35,11 @@ def smooth_terms(
             columns += [_shift(way, np.broadcast_to(np.eye(2)[k], (frames, 2)), markers) for k in range(2)]
             sd += [share * noise.drift_m] * 2
     if noise.systematic_m > 0:
-        forwards = np.column_stack([np.cos(heading_rad), np.sin(heading_rad)])
-        across = np.column_stack([-forwards[:, 1], forwards[:, 0]])
+        forwards = unit_vectors(heading_rad)
+        across = quarter_turn(forwards)
         place = np.linspace(-1, 1, markers) if markers > 1 else np.zeros(1)
         for wave in gait_waves(trial):
-            for order in range(min(SHAPES, markers)):
+            for order in range(min(SMOOTH_ERRORS.shapes, markers)):
                 shape = np.polynomial.Legendre.basis(order)(place)
                 columns += [_shift(wave, d, markers, shape) for d in (forwards, across)]
         sd += [noise.systematic_m] * (len(columns) - len(sd))
@@ -52,10 +53,11 @@ def unit_terms(trial: Trial, prediction: Prediction) -> np.ndarray:
     return np.asarray((columns * sd).reshape(frames, coordinates, -1))
 
 
-def gait_waves(trial: Trial, harmonics: int = HARMONICS) -> list[np.ndarray]:
+def gait_waves(trial: Trial, harmonics: int | None = None) -> list[np.ndarray]:
     """Return cosines and sines of the gait's phase and its multiples, (T,) each; none without a period."""
     if not math.isfinite(trial.period_s):
         return []
+    harmonics = SMOOTH_ERRORS.harmonics if harmonics is None else harmonics
     phase = 2 * math.pi * trial.time_s / trial.period_s
     return [f(k * phase) for k in range(1, harmonics + 1) for f in (np.cos, np.sin)]
 

@@ -42,6 +42,10 @@ class TrialSettings:
         Times as long beyond it, where clocks may run fast.
     latest_marker_s : float
         By which a marker may be seen later than the one before it.
+    trials_at_once : int
+        Whose motions are in memory together: enough to fill the lanes of the compiled code.
+    most_kept_values : int
+        Measured values up to which derivatives and motions are kept: some 300 MB.
     """
 
     tolerance_m_s: float = 5e-6
@@ -50,6 +54,8 @@ class TrialSettings:
     tail_s: float = 0.05
     fastest_clock: float = 0.03
     latest_marker_s: float = 0.03
+    trials_at_once: int = 48
+    most_kept_values: int = 1_200_000
 
 
 TRIAL = TrialSettings()
@@ -174,8 +180,8 @@ class TrialRun:
         self.timeline = timeline_of(trial, model.segments, fastest, latest_s)
         self.meshes: Meshes = {}
 
-    def __call__(self, values: Values, tolerance_m_s: float = TRIAL.tolerance_m_s) -> Nodes:
-        """Simulate the trial, with a local error of `tolerance_m_s` in the body's speed.
+    def __call__(self, values: Values, tolerance_m_s: float | None = None) -> Nodes:
+        """Simulate the trial; the local error of the body's speed is by default that of `TrialSettings`.
 
         Raises
         ------
@@ -185,12 +191,13 @@ class TrialRun:
         return run_one(self.search(values, tolerance_m_s))
 
     def search(
-        self, values: Values, tolerance_m_s: float = TRIAL.tolerance_m_s, attempts: int | None = None
+        self, values: Values, tolerance_m_s: float | None = None, attempts: int | None = None
     ) -> Search[Nodes]:
         """Do what a call does, as a search: see `simulate.batched` for many trials at once.
 
         With a single one of `attempts` the last meshes serve as they are.
         """
+        tolerance_m_s = TRIAL.tolerance_m_s if tolerance_m_s is None else tolerance_m_s
         structure, kept = self.model.structure(values)
         packed = self.model.pack(values, self.conditions)
         p = packed.p

@@ -14,20 +14,19 @@ import numpy as np
 
 from srs_opt.calibrate.alignment import FREE, align
 from srs_opt.calibrate.coordinates import SCATTER_SD, Coordinate
+from srs_opt.calibrate.fit_settings import FIT
 from srs_opt.calibrate.model import Model
 from srs_opt.calibrate.noise import Noise, track_of
 from srs_opt.calibrate.normal_equations import NormalEquations, trial_normal_equations
 from srs_opt.calibrate.observe import Prediction, predict
 from srs_opt.calibrate.smooth import smooth_terms
-from srs_opt.calibrate.trial_simulation import Meshes, Nodes, TrialRun
+from srs_opt.calibrate.trial_simulation import TRIAL, Meshes, Nodes, TrialRun
 from srs_opt.calibrate.whiten import Whitening
 from srs_opt.errors import NoAnswerError
 from srs_opt.measurement.records import Trial
 from srs_opt.robot import Robot
 from srs_opt.simulate.batched import run_batched
 
-AT_ONCE = 48  # trials whose motions are in memory together: enough to fill the lanes
-ROUGHER = 5.0  # times the tolerance, for fits whose misfit hides it
 Extra = Callable[[Trial, Prediction], np.ndarray]
 Place = tuple[bool, dict[str, float]]  # where a trial was simulated: roughly or not, the values
 Answer = NormalEquations | np.ndarray | NoAnswerError
@@ -176,8 +175,8 @@ class Trials:
     def answer(self, names: Sequence[str], request: Request) -> dict[str, Answer]:
         """Return the trials' normal equations or residuals (T, 2 M), or why there are none; side by side."""
         found: dict[str, Answer] = {}
-        for first in range(0, len(names), AT_ONCE):
-            some = names[first : first + AT_ONCE]
+        for first in range(0, len(names), TRIAL.trials_at_once):
+            some = names[first : first + TRIAL.trials_at_once]
             for name, nodes in self._simulated(some, request).items():
                 found[name] = nodes if isinstance(nodes, NoAnswerError) else self._seen(name, nodes, request)
         return found
@@ -228,7 +227,7 @@ class Trials:
         for n in names:
             if n in self._motions and self._motions[n][0] == wanted[n]:
                 known[n] = self._motions[n][1]
-        tolerance = self.tolerance_m_s * (ROUGHER if request.rough else 1.0)
+        tolerance = self.tolerance_m_s * (FIT.rough_tolerance if request.rough else 1.0)
         rest = [n for n in names if n not in known]
         attempts = [1 if self._last.get(n) == wanted[n] else None for n in rest]
         point = request.point

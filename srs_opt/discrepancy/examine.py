@@ -12,7 +12,7 @@ import numpy as np
 
 from srs_opt.calibrate.candidates import Candidate
 from srs_opt.calibrate.experiment import Experiment, Point
-from srs_opt.calibrate.fit import PLAIN
+from srs_opt.calibrate.fit_settings import FIT
 from srs_opt.calibrate.normal_equations import NormalEquations
 from srs_opt.calibrate.objective import priors, sum_eliminated
 from srs_opt.discrepancy.detect import detect, project, with_shared
@@ -52,7 +52,7 @@ def linearised(
     others = [c for k in candidates for c in k.sizes if c.name not in names]
     coordinates = (*fit.coordinates, *others)
     point = Point({**{c.name: 0.0 for c in others}, **fit.point.values}, fit.point.scatter)
-    rough = fit.variance_inflation > PLAIN
+    rough = fit.variance_inflation > FIT.rough_inflation
     rest = [t for t in trials if t not in screened]
     found: dict[str, NormalEquations] = {}
     if rest:

@@ -10,9 +10,9 @@ import numpy as np
 from srs_opt.calibrate.candidates import all_candidates, fitted_coordinates
 from srs_opt.calibrate.experiment import Experiment, Point
 from srs_opt.calibrate.fit import start_point
+from srs_opt.calibrate.fit_settings import OBJECTIVE
 from srs_opt.calibrate.model import Model
 from srs_opt.calibrate.noise import Noise
-from srs_opt.calibrate.normal_equations import RANK
 from srs_opt.calibrate.objective import priors, projected, sum_eliminated
 from srs_opt.discrepancy.design import NOTHING, NextExperiment
 from srs_opt.discrepancy.gap_settings import DETECTION, FIRST
@@ -42,7 +42,7 @@ def first_experiment(dataset: DataSet, noise: Noise, model: str | None = None) -
         return None
     total, fitted = sum_eliminated(equations), len(coordinates)
     precision, _ = priors(coordinates, point)
-    _, left = projected(total, fitted, precision, RANK)
+    _, left = projected(total, fitted, precision, OBJECTIVE.least_eigenvalue)
     limit = chdtri(1, DETECTION.name_level / len(candidates))
     powers: dict[str, float] = {}
     for k, candidate in enumerate(candidates):

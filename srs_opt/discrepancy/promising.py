@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from srs_opt.calibrate.candidates import Candidate
-from srs_opt.calibrate.fit import FAR_OFF
+from srs_opt.calibrate.fit_settings import FIT
 from srs_opt.discrepancy.alike import Angles
 from srs_opt.discrepancy.diagnostics import Diagnostics, needed_gain
 from srs_opt.discrepancy.gap_settings import EXPLANATION
@@ -23,7 +23,7 @@ def promising(current: Diagnostics, depth: int, family: int) -> list[Score]:
         if s.improvement > needed_gain(s.candidate, family)
         or s.improvement * inflation > SCREEN.relevant_deviance
     ]
-    if inflation < FAR_OFF:  # expected sizes can be believed
+    if inflation < FIT.unexplained_inflation:  # expected sizes can be believed
         scores = [s for s in scores if s.relative_size >= EXPLANATION.telling_size]
     far = inflation > 1  # nearer, a little bending's derivatives hold as all others do
     leaps = [s for s in current.scores if far and s.candidate.form.effect.bends]

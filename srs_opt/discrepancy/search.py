@@ -9,7 +9,8 @@ from srs_opt.calibrate.candidates import Candidate
 from srs_opt.calibrate.colour import coloured
 from srs_opt.calibrate.coordinates import Coordinate
 from srs_opt.calibrate.experiment import Experiment, Point
-from srs_opt.calibrate.fit import FAR_OFF, start_point
+from srs_opt.calibrate.fit import start_point
+from srs_opt.calibrate.fit_settings import FIT
 from srs_opt.calibrate.noise import Noise
 from srs_opt.calibrate.slow import smooth_part
 from srs_opt.discrepancy.diagnostics import Diagnostics, explainable, explained, needed_gain
@@ -168,7 +169,7 @@ class Search:
     def noise_aware(self, diagnostics: Diagnostics) -> Diagnostics:
         """Return a hypothesis examined anew under smooth errors, if small ones explain what it leaves."""
         now, lin = self.experiment.noise, diagnostics.linearisation
-        if diagnostics.adequate or now.smooth or lin.variance_inflation > FAR_OFF:
+        if diagnostics.adequate or now.smooth or lin.variance_inflation > FIT.unexplained_inflation:
             return diagnostics
         amplitudes = self.functions.amplitudes(self.trials, len(lin.coordinates))
         noise = smooth_part(now, lin.telling, amplitudes, lin.coordinates, lin.point)
@@ -247,7 +248,7 @@ class Search:
     def _polished(self, hypothesis: Hypothesis) -> Hypothesis:
         """Return a hypothesis that explains the data with its fit carried on, where that had not ended."""
         fit = hypothesis.fit
-        if fit.converged or fit.variance_inflation > FAR_OFF:
+        if fit.converged or fit.variance_inflation > FIT.unexplained_inflation:
             return hypothesis
         return self.fit(hypothesis.candidates, fit.point, SEARCH.polish_iterations) or hypothesis
 

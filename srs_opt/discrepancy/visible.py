@@ -9,8 +9,8 @@ import numpy as np
 
 from srs_opt.calibrate.candidates import Candidate
 from srs_opt.calibrate.experiment import Experiment, Point
+from srs_opt.calibrate.fit_settings import OBJECTIVE
 from srs_opt.calibrate.noise import track_of
-from srs_opt.calibrate.normal_equations import RANK
 from srs_opt.calibrate.objective import priors, projected, sum_eliminated
 from srs_opt.discrepancy.diagnostics import Diagnostics, needed_gain
 from srs_opt.discrepancy.gap_settings import PLAUSIBILITY, VISIBLE
@@ -66,7 +66,7 @@ def visible(
     lin = null.linearisation
     total = sum_eliminated(lin.telling, lin.variance_inflation)
     precision, _ = priors(lin.coordinates, lin.point)
-    inverse, left = projected(total, lin.fitted, precision, RANK)
+    inverse, left = projected(total, lin.fitted, precision, OBJECTIVE.least_eigenvalue)
     free = {c.name: k for k, c in enumerate(lin.coordinates[lin.fitted :])}
     played = _spread([t for t in trials if t.kind == "gait"] or trials)
     sizes, unseen = {}, []

@@ -8,9 +8,10 @@ from scipy import optimize
 
 from srs_opt.calibrate.coordinates import Coordinate
 from srs_opt.calibrate.experiment import Point
-from srs_opt.calibrate.fit import CONVERGED, fit
+from srs_opt.calibrate.fit import fit
+from srs_opt.calibrate.fit_settings import FIT, OBJECTIVE
 from srs_opt.calibrate.normal_equations import trial_normal_equations
-from srs_opt.calibrate.objective import AHEAD, MOST_SCATTER, bent_move, best_move, objective, within_reach
+from srs_opt.calibrate.objective import best_move, geodesic_move, objective, within_reach
 from srs_opt.calibrate.whiten import Whitening
 
 TRUTH = np.array([0.4, 1.2])
@@ -59,7 +60,7 @@ def test_a_converged_fit_has_nothing_left_to_gain_however_many_data(count, wrong
     assert found.variance_inflation == 1
     equations = measured.normal_equations(found.point, COORDINATES)
     now = objective(COORDINATES, equations, found.point, 1.0)
-    assert now - within_reach(COORDINATES, equations, found.point) < CONVERGED
+    assert now - within_reach(COORDINATES, equations, found.point) < FIT.converged_deviance
     if not wrong:
         off = [found.point.values[c.name] - v for c, v in zip(COORDINATES, TRUTH)]
         assert np.all(np.abs(off) < 4 * np.array(list(found.sd.values())))
@@ -88,8 +89,8 @@ def test_a_step_with_scatter_at_its_limits_is_that_of_a_general_solver(seed):
     for k in range(3):  # the scatter's prior
         rows.append(np.eye(5)[2 + k : 3 + k] / sd)
         measured.append(-trials[names[k]].scatter_now / sd)
-    limit = [MOST_SCATTER * sd[0] - trials[n].scatter_now[0] for n in names]
-    low = [-MOST_SCATTER * sd[0] - trials[n].scatter_now[0] for n in names]
+    limit = [OBJECTIVE.most_scatter_sd * sd[0] - trials[n].scatter_now[0] for n in names]
+    low = [-OBJECTIVE.most_scatter_sd * sd[0] - trials[n].scatter_now[0] for n in names]
     bounds = ([-np.inf, -np.inf, *low], [np.inf, np.inf, *limit])
     theirs = optimize.lsq_linear(np.vstack(rows), np.concatenate(measured), bounds, tol=1e-14).x
     move = best_move(coordinates, trials, Point({"a": 0.0, "b": 0.0}), 1.0)
@@ -109,7 +110,9 @@ def test_the_bend_of_a_valley_is_followed_to_second_order(away, share):
         values = {n: v + s for (n, v), s in zip(start.values.items(), step)}
         return Point(values), measured.normal_equations(Point(values), COORDINATES, stale=True)
 
-    bent = bent_move(COORDINATES, equations, there(AHEAD * move.step)[1], start, 1.0, 0.0, move)
+    bent = geodesic_move(
+        COORDINATES, equations, there(OBJECTIVE.probe_share * move.step)[1], start, 1.0, 0.0, move
+    )
     lowest = fit(measured, COORDINATES, start, iterations=100).deviance
     left = [objective(COORDINATES, *there(m.step)[::-1], 1.0) - lowest for m in (move, bent)]
     assert left[1] < share * left[0]

@@ -7,9 +7,10 @@ from srs_opt.calibrate.candidates import all_candidates
 from srs_opt.calibrate.coordinates import base_coordinates
 from srs_opt.calibrate.experiment import Experiment, Point
 from srs_opt.calibrate.fit import start_point
+from srs_opt.calibrate.fit_settings import DERIVATIVE
 from srs_opt.calibrate.initial_pose import initial_pose
 from srs_opt.calibrate.model import Model
-from srs_opt.calibrate.sensitivity import HAIR, variation
+from srs_opt.calibrate.sensitivity import variation
 from srs_opt.calibrate.trial_simulation import (
     TRIAL,
     _fitted,
@@ -75,7 +76,7 @@ def test_differences_are_the_tangents_of_the_integration(setting, effects):
         moved = np.zeros(state.size)
         moved[:3] = initial_pose(structure, nodes.p[kept], trial.heading_rad)[1] @ seeds[:, k]
         tangent = kernel.run([Course(np.concatenate([state, moved]), h, inputs, p)])[0][:, state.size :, 0]
-        rounding = 1e-14 / (HAIR * typical[k])  # of states of the order of one
+        rounding = 1e-14 / (DERIVATIVE.perturbation * typical[k])  # of states of the order of one
         for mine, theirs in (
             (found.pose[1:, :, k], tangent[:, :3]),
             (found.shape[1:, :, k], tangent[:, BODY_STATES : BODY_STATES + n]),
