@@ -36,7 +36,7 @@ def own_scatter(experiment: Experiment, fit: Fit, trials: Sequence[Trial]) -> Po
     return point
 
 
-def stands_apart(
+def outlying_trials(
     experiment: Experiment, fit: Fit, trials: Sequence[Trial], refit: Refit
 ) -> tuple[dict[str, str], Fit]:
     """Return the few trials, if any, that contradict all others, and the fit to these.

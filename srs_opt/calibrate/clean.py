@@ -12,14 +12,14 @@ import numpy as np
 from srs_opt.calibrate.data_settings import CLEANING
 from srs_opt.calibrate.noise import track_of
 from srs_opt.measurement.chain import chain_of
-from srs_opt.measurement.labels import mend_labels
+from srs_opt.measurement.labels import correct_labels
 from srs_opt.measurement.noise import MAD
 from srs_opt.measurement.records import Array, DataSet, Trial
 from srs_opt.robot import Robot
 
 
 @dataclass(frozen=True)
-class Mended:
+class CleanedTracks:
     """What was done to the tracks of a data set.
 
     Attributes
@@ -42,7 +42,7 @@ class Mended:
         return sum(self.outliers.values()) / max(self.seen, 1)
 
 
-def mended(dataset: DataSet) -> Mended:
+def cleaned(dataset: DataSet) -> CleanedTracks:
     """Return the data set with exchanged labels put right and outliers taken for lost."""
     trials, outliers, swapped, seen = [], {}, {}, 0
     for trial in dataset.trials:
@@ -61,7 +61,7 @@ def mended(dataset: DataSet) -> Mended:
             points = np.where(wild[..., None], np.nan, points)
             trial = _with_points(trial, points)
         trials.append(trial)
-    return Mended(replace(dataset, trials=tuple(trials)), outliers, swapped, seen)
+    return CleanedTracks(replace(dataset, trials=tuple(trials)), outliers, swapped, seen)
 
 
 def _relabelled(robot: Robot, trial: Trial) -> tuple[Trial, int]:
@@ -70,7 +70,7 @@ def _relabelled(robot: Robot, trial: Trial) -> tuple[Trial, int]:
     chain = chain_of(robot, trial.spots)
     if trial.markers_m.shape[1] != chain.markers:
         return trial, 0
-    found = mend_labels(chain, trial.markers_m)
+    found = correct_labels(chain, trial.markers_m)
     count = int(found.swapped.sum())
     return (replace(trial, markers_m=found.markers_m), count) if count else (trial, 0)
 

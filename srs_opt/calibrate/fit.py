@@ -313,7 +313,7 @@ class _Descent:
         after: tuple[Point, dict[str, NormalEquations]],
         inflation: float,
     ) -> Point:
-        """Return the new point with the scatter of trials that went astray taken back; their matrices follow.
+        """Return the new point with the scatter of diverging trials taken back; their matrices follow.
 
         A trial's scatter is its own affair: one near a change of its gait, which follows far less linearly
         than the others, must not hold up the fit to all.
@@ -338,15 +338,15 @@ class _Descent:
         scatter = dict(moved.scatter)
         for part in FIT.scatter_parts:
             known = [t for t in self.trials if t.name in allowed]
-            astray = [t for t in known if own(new_equations[t.name]) > allowed[t.name]]
-            if not 0 < len(astray) <= len(allowed) // FIT.trials_per_astray:
+            diverging = [t for t in known if own(new_equations[t.name]) > allowed[t.name]]
+            if not 0 < len(diverging) <= len(allowed) // FIT.trials_per_diverging:
                 break
             tried = dict(scatter)
-            for t in astray:
+            for t in diverging:
                 now = point.scatter.get(t.name, np.zeros_like(equations[t.name].scatter_sd))
                 tried[t.name] = now + part * (moved.scatter[t.name] - now)
-            found = self._measured(Point(moved.values, tried), astray, stale=True)
-            for t in astray:
+            found = self._measured(Point(moved.values, tried), diverging, stale=True)
+            for t in diverging:
                 if own(found[t.name]) < own(new_equations[t.name]):
                     new_equations[t.name], scatter[t.name] = found[t.name], tried[t.name]
         return Point(moved.values, scatter)

@@ -45,9 +45,10 @@ class FitSettings:
     most_idle : int
         Steps that gain nothing, at which a fit is given up.
     scatter_parts : tuple of float
-        Parts of a step that the scatter of a trial may go instead that went astray.
-    trials_per_astray : int
-        Only where no more than one trial in so many went astray: else the step was too long.
+        Parts of a step that the scatter of a trial may go instead, whose misfit rose against what the
+        derivatives promised.
+    trials_per_diverging : int
+        Only where that is no more than one trial in so many: else the step was too long.
     jitter_per_value : float
         Deviance per measured value that a new mesh of the integration may cost. Too small: jitter is taken
         for a loss, and the step is damped.
@@ -71,7 +72,7 @@ class FitSettings:
     most_damping: float = 1e4
     most_idle: int = 2
     scatter_parts: tuple[float, ...] = (0.5, 0.2, 0.0)
-    trials_per_astray: int = 3
+    trials_per_diverging: int = 3
     jitter_per_value: float = 2e-5
 
 

@@ -28,7 +28,7 @@ class Noise:
     correlated_sd_m, correlation_s : float
         Further noise per coordinate, an Ornstein-Uhlenbeck process of its own: sd^2 exp(-|dt|/correlation_s).
     drift_m : float
-        Standard deviation, per direction, of how far the whole picture creeps in a trial.
+        Standard deviation, per direction, of how far the whole picture drifts in a trial.
     systematic_m : float
         Standard deviation of the amplitudes of smooth errors that repeat with the gait (`smooth_terms`).
     """

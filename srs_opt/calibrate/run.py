@@ -6,9 +6,9 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from srs_opt.calibrate.apart import stands_apart
+from srs_opt.calibrate.apart import outlying_trials
 from srs_opt.calibrate.candidates import fitted_coordinates
-from srs_opt.calibrate.clean import mended
+from srs_opt.calibrate.clean import cleaned
 from srs_opt.calibrate.colour import coloured
 from srs_opt.calibrate.experiment import Experiment
 from srs_opt.calibrate.fit import Fit, fit, start_point
@@ -45,7 +45,7 @@ def calibrate(
     from srs_opt.calibrate.rejection import left_out
 
     tell = report or (lambda message: None)
-    dataset = _mended(dataset, tell)
+    dataset = _cleaned(dataset, tell)
     aside = left_out(dataset.trials)
     for name, why in aside.items():
         tell(f"trial {name} left out: {why}")
@@ -88,7 +88,7 @@ def _without_odd(experiment: Experiment, found: Fit) -> tuple[Experiment, Fit, d
         # from the bench's values: what the fit to all found is bent by the very trial that is left out
         return fit(experiment, coordinates, None, rest, FIT.refit_iterations)
 
-    odd, found = stands_apart(experiment, found, experiment.trials, refit)
+    odd, found = outlying_trials(experiment, found, experiment.trials, refit)
     if not odd:
         return experiment, found, odd
     rest = [t for t in experiment.trials if t.name not in odd]
@@ -99,9 +99,9 @@ def _without_odd(experiment: Experiment, found: Fit) -> tuple[Experiment, Fit, d
     return experiment, found, odd
 
 
-def _mended(dataset: DataSet, tell: Callable[[str], None]) -> DataSet:
+def _cleaned(dataset: DataSet, tell: Callable[[str], None]) -> DataSet:
     """Return the data set without outliers and with labels in order."""
-    found = mended(dataset)
+    found = cleaned(dataset)
     if found.outliers:
         tell(f"{sum(found.outliers.values())} positions left out as outliers")
     if found.swapped:

@@ -87,7 +87,7 @@ class ResidualFunctions:
     def amplitudes(self, trials: Sequence[Trial], first: int) -> dict[str, Amplitudes]:
         """Return what smooth errors of every trial are made of: columns, counted from `first`.
 
-        The picture's creeping is a shift that grows evenly, about its mean; what repeats with the gait are
+        The picture's drift is a shift that grows evenly, about its mean; what repeats with the gait are
         its waves in any pattern.
         """
         return {t.name: self._amplitudes(first, max(float(np.ptp(t.time_s)), 1e-9)) for t in trials}

@@ -90,8 +90,8 @@ class SealSettings:
     Attributes
     ----------
     block_s : float
-        Blocks that are resampled for the interval: longer than the misfit is correlated, or the interval is
-        too narrow.
+        Blocks that are resampled for the interval. Shorter than the misfit is correlated, the interval is too
+        narrow; longer, there are too few blocks.
     draws : int
         Of that resampling.
     correlation_s : float

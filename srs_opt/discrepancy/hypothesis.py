@@ -128,7 +128,7 @@ def left_of(before: Hypothesis, after: Hypothesis) -> float:
 
 
 def stuck(before: Hypothesis, after: Hypothesis) -> bool:
-    """Whether piling up effects only nibbles at the misfit: what is missing is none of them."""
+    """Whether further effects reduce the misfit too little: what is missing is none of them."""
     left = left_of(before, after)
     return (
         len(after.candidates) > 1

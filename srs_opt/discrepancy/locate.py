@@ -68,7 +68,7 @@ def stages(null: Hypothesis, fitted: Sequence[Hypothesis]) -> tuple[Place, ...]:
     """Return the stages of the model whose effects close most of the gap when they are fitted, best first.
 
     What an effect would gain in the screen says little where the gap is large: much that has nothing to do
-    with it soaks some of it up. Effects of several stages together tell of these only as the best set.
+    with it absorbs some of it. Effects of several stages together tell of these only as the best set.
     """
 
     def closed(h: Hypothesis) -> float:

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from srs_opt.calibrate.apart import stands_apart
+from srs_opt.calibrate.apart import outlying_trials
 from srs_opt.calibrate.candidates import Candidate, all_candidates, fitted_coordinates
-from srs_opt.calibrate.clean import mended
+from srs_opt.calibrate.clean import cleaned
 from srs_opt.calibrate.experiment import Experiment
 from srs_opt.calibrate.fit import Fit
 from srs_opt.calibrate.forms import form_of_entry
@@ -172,7 +172,7 @@ def diagnose(
     """
     started = time.perf_counter()
     tell = report or (lambda message: None)
-    clean = mended(dataset)
+    clean = cleaned(dataset)
     dataset = clean.dataset
     split = split_trials(dataset.trials)
     noise = noise_of(replace(dataset, trials=split.open))
@@ -301,7 +301,7 @@ def without_odd(search: Search, null: Diagnostics) -> tuple[Search, Diagnostics,
         tried[tuple(names)] = rest, found
         return found.fit
 
-    odd, _ = stands_apart(search.experiment, null.hypothesis.fit, search.trials, refit)
+    odd, _ = outlying_trials(search.experiment, null.hypothesis.fit, search.trials, refit)
     if not odd:
         return search, null, odd
     rest, found = tried[tuple(odd)]

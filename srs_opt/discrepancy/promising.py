@@ -26,10 +26,10 @@ def promising(current: Diagnostics, depth: int, family: int) -> list[Score]:
     if inflation < FIT.unexplained_inflation:  # expected sizes can be believed
         scores = [s for s in scores if s.relative_size >= EXPLANATION.telling_size]
     far = inflation > 1  # nearer, a little bending's derivatives hold as all others do
-    leaps = [s for s in current.scores if far and s.candidate.form.effect.bends]
-    scores = [s for s in scores if s not in leaps]
+    soft = [s for s in current.scores if far and s.candidate.form.effect.bends]
+    scores = [s for s in scores if s not in soft]
     if not scores:
-        return leaps
+        return soft
     best = scores[0].improvement
     limit = min(
         SCREEN.contender_share * best, max(best - SCREEN.near_deviance, SCREEN.least_contender_share * best)
@@ -38,16 +38,16 @@ def promising(current: Diagnostics, depth: int, family: int) -> list[Score]:
     if depth == 0:
         angles = Angles(current.linearisation)
         for s in scores:
-            if s not in chosen and s.improvement > SCREEN.kin_share * best:
+            if s not in chosen and s.improvement > SCREEN.similar_share * best:
                 angle = angles.between(scores[0].candidate, s.candidate)
-                if angle is not None and angle < SCREEN.kin_rad:
+                if angle is not None and angle < SCREEN.similar_rad:
                     chosen.append(s)
-    return [*chosen, *leaps]
+    return [*chosen, *soft]
 
 
-def akin(diagnostics: Diagnostics, candidate: Candidate) -> bool:
+def could_replace(diagnostics: Diagnostics, candidate: Candidate) -> bool:
     """Whether a candidate could do about what the effects of a hypothesis that explains the data do."""
     have = diagnostics.hypothesis.candidates
     angles = Angles(diagnostics.linearisation, have)
     found = (angles.between(a, candidate) for a in have if a is not candidate)
-    return any(angle is not None and angle < SCREEN.kin_rad for angle in found)
+    return any(angle is not None and angle < SCREEN.similar_rad for angle in found)

@@ -18,7 +18,7 @@ from srs_opt.discrepancy.examine import examined, linearised, screened_of
 from srs_opt.discrepancy.functions import ResidualFunctions
 from srs_opt.discrepancy.gap_settings import PLAUSIBILITY
 from srs_opt.discrepancy.hypothesis import Hypothesis, cost, fit_hypothesis, fit_key, left_of, stuck
-from srs_opt.discrepancy.promising import akin, promising
+from srs_opt.discrepancy.promising import could_replace, promising
 from srs_opt.discrepancy.screen import Score, expected_start, screen
 from srs_opt.discrepancy.search_settings import SEARCH
 from srs_opt.discrepancy.soft_start import soft_start
@@ -213,7 +213,7 @@ class Search:
     def _begun(self, null: Diagnostics) -> tuple[Diagnostics, bool]:
         """Return what a search of the start of a few trials finds, fitted to all; whether that is the end.
 
-        It takes a third of the time, and most of a gap that it is left with is not mended by more data.
+        It takes a third of the time, and most gaps that it cannot close are not closed with more data either.
         """
         if self.quick == self.trials:
             return null, False
@@ -303,7 +303,7 @@ class Search:
         for score in (*others[:before], *bending, *others[before:]):
             if have and score in bending and self._gets_on(found, current):
                 continue
-            if explains is not None and not akin(self.examine(explains), score.candidate):
+            if explains is not None and not could_replace(self.examine(explains), score.candidate):
                 continue
             start = self._start(current, score)
             beat = min((h.deviance for h in found), default=math.inf)

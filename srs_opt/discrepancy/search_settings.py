@@ -20,16 +20,15 @@ class SearchSettings:
     quick_iterations : int
         Of a fit to the first seconds of a few trials, before all are asked.
     most_effects : int
-        In a set. Three can already soak up most of any gap; a fifth would only be believed beside four others
-        that are wrong.
+        In a set. Three can already absorb most of any gap.
     most_effects_brief : int
         The same with the first seconds of a few trials.
     rounds : int
         Additions and exchanges of effects in all.
     refits_by_effects : tuple
         Candidates that are fitted, by the number of effects that are there already: fewer as every fit has
-        more coordinates. Half: the truth is missed where it is not first in the screen; double: twice the
-        time.
+        more coordinates. Fewer: the truth may be missed where it is not first in the screen; more: the time
+        grows with them.
     refits_before_bending : int
         Fits of the best of the screen before one with a bending body, which costs as much as three of others.
     rival_deviance : float
@@ -97,10 +96,10 @@ class ScreenSettings:
     relevant_deviance : float
         Expected gain, the noise taken as it was stated, from which a candidate is considered although a fit
         that is far off hides its significance.
-    kin_rad : float
+    similar_rad : float
         Angle between what two candidates do, below which one that is well behind in the screen is fitted all
         the same: far from the linearisation's point an effect does up to sin^2 of it of something else.
-    kin_share : float
+    similar_share : float
         Share of the best expected gain that such a candidate must promise.
     alike_rad : float
         20 degrees: 0.9 of what one effect does the other can do too. Half leaves out pairs that noisier data
@@ -121,8 +120,8 @@ class ScreenSettings:
     near_deviance: float = 40.0
     least_contender_share: float = 0.25
     relevant_deviance: float = 60.0
-    kin_rad: float = 0.8
-    kin_share: float = 0.2
+    similar_rad: float = 0.8
+    similar_share: float = 0.2
     alike_rad: float = 0.35
     screened_s: float = 60.0
     start_reach: float = 2.0

@@ -32,7 +32,7 @@ class AdequacySettings:
     part_share : float
         Share of the gap that effects may leave which are named as a part of what is missing.
     part_effects : int
-        How many effects may be named as a part: three can soak up most of anything.
+        How many effects may be named as a part: three can absorb most of any gap.
     part_lead : float
         Share of the gap by which every set without such an effect must leave more.
     part_change : float

@@ -1,7 +1,7 @@
 """Where a fit of a body that bends under load begins: soft already, at the bench's values.
 
 Such a body moves otherwise before it is as soft as the real one. What calibration made of that (half the
-friction) hides it from derivatives about a rigid body, and from far off a fit goes astray; so some
+friction) hides it from derivatives about a rigid body, and from far off a fit diverges; so some
 stiffnesses are played, and the best one is where to begin.
 """
 

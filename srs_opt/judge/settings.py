@@ -36,7 +36,7 @@ class SettlingSettings:
         Rows by which a cycle's mean motion is measured.
     least_cycles, most_cycles : int
         Played before the motion may count as steady, and at all. Two differences of three changes are needed,
-        so fewer than 4 say nothing; gaits that have not settled by `most_cycles` never do.
+        so fewer than 4 say nothing.
     remaining_share : float
         What may remain of the approach to the steady motion, over the motion itself. The approach is
         geometric, so the last changes tell its ratio and what is still to come. Half: about one cycle more

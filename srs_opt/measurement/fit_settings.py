@@ -12,13 +12,13 @@ class ShapeSettings:
     Attributes
     ----------
     prior_bend_rad : float
-        Standard deviation of a segment's bend before anything is seen. It matters where markers are lost;
-        half of it would pull strongly bent gaits (about 1 rad) towards straight, double leaves frames with
-        few markers undetermined.
+        Standard deviation of a segment's bend before anything is seen. It matters where markers are lost:
+        smaller pulls strongly bent segments towards straight, larger leaves frames with few markers
+        undetermined.
     far_m, far_rad : float
         Prior deviations of position and heading: nothing is known of them.
     iterations : int
-        Of Levenberg-Marquardt, at most; a frame takes three to six.
+        Of Levenberg-Marquardt, at most.
     least_gain : float
         Drop of twice the negative log posterior below which a frame's fit has ended.
     undetermined_share : float

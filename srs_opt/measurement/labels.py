@@ -18,7 +18,7 @@ from srs_opt.measurement.take_settings import LABELS
 
 
 @dataclass(frozen=True, eq=False)
-class MendedLabels:
+class CorrectedLabels:
     """Markers with their labels put right.
 
     Attributes
@@ -35,7 +35,7 @@ class MendedLabels:
     dropped: np.ndarray
 
 
-def mend_labels(chain: Chain, markers_m: Array) -> MendedLabels:
+def correct_labels(chain: Chain, markers_m: Array) -> CorrectedLabels:
     """Put right labels that are exchanged in some frames; take out positions that fit no link.
 
     Parameters
@@ -47,17 +47,17 @@ def mend_labels(chain: Chain, markers_m: Array) -> MendedLabels:
     points = np.asarray(markers_m, dtype=float)
     calm = np.zeros(len(points), dtype=bool), np.zeros(points.shape[:2], dtype=bool)
     if not _suspicious(chain, points):
-        return MendedLabels(points, *calm)
+        return CorrectedLabels(points, *calm)
     counts = np.isfinite(points[..., 0]).sum(axis=1)
     start = next((k for k in np.flatnonzero(counts == counts.max()) if fits_chain(chain, points[k])), None)
     if start is None:
-        return MendedLabels(points, *calm)
+        return CorrectedLabels(points, *calm)
     owners = follow(chain, points, int(start), np.arange(chain.markers))
     mended = take(points, owners)
     own = np.arange(chain.markers)
     swapped = ((owners >= 0) & (owners != own)).any(axis=1)
     used = (owners[:, :, None] == own).any(axis=1)
-    return MendedLabels(mended, swapped, np.isfinite(points[..., 0]) & ~used)
+    return CorrectedLabels(mended, swapped, np.isfinite(points[..., 0]) & ~used)
 
 
 def _suspicious(chain: Chain, points: Array) -> bool:

@@ -13,7 +13,7 @@ class OnsetSettings:
     ----------
     threshold_sd : float
         Noise deviations beyond which a coordinate has left its rest, three frames in a row. Half: noise
-        counts as motion; double: the bracket of the start moves by a few frames, the fit itself hardly.
+        counts as motion now and then; double: the first motion is seen later.
     quiet_frames : int
         At the beginning, whose median is the rest. A take that moves within them began in mid-gait.
     cycles : float
@@ -147,7 +147,7 @@ class LabelSettings:
     uneven_share : float
         Of the mean spacing: spacings that differ by more end to end tell which end is the tail.
     most_paths : int
-        That are looked at for the best chain: enough for dozens of ghosts, a second of time.
+        That are looked at for the best chain, where there are many ghosts; more take longer.
     most_turn_rad : float
         At a marker: a segment does not bend by more than about a right angle.
     """

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from srs_opt.calibrate.clean import mended, outliers_of
+from srs_opt.calibrate.clean import cleaned, outliers_of
 from srs_opt.calibrate.colour import coloured
 from srs_opt.calibrate.coordinates import Coordinate
 from srs_opt.calibrate.entries import contradicted
@@ -81,7 +81,7 @@ def test_exchanged_labels_are_put_right():
     points = wave() + 0.001 * np.random.default_rng(2).standard_normal((TIME_S.size, LINKS, 2))
     swapped = points.copy()
     swapped[100:120, [1, 2]] = swapped[100:120, [2, 1]]
-    found = mended(DataSet("", wpi_srs(), RATE_HZ, 0.001, trials=(trial(swapped),)))
+    found = cleaned(DataSet("", wpi_srs(), RATE_HZ, 0.001, trials=(trial(swapped),)))
     assert found.swapped == {"t": 20}
     assert np.allclose(found.dataset.trials[0].markers_m, points)
 

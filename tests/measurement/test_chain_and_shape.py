@@ -7,7 +7,7 @@ from measure_fixtures import ROBOT, binomial_allows, chain_points, gait_track
 
 from srs_opt.errors import InputError
 from srs_opt.measurement.chain import chain_of, headings, link_positions, position_jacobian
-from srs_opt.measurement.labels import mend_labels
+from srs_opt.measurement.labels import correct_labels
 from srs_opt.measurement.shape import shape_from_markers
 from srs_opt.measurement.smooth import Intensity, smooth_shape
 from virtual_lab.simulate import run
@@ -116,7 +116,7 @@ def test_swapped_labels_are_mended():
     swapped = clean.copy()
     swapped[60:75, [1, 3]] = swapped[60:75, [3, 1]]
     swapped[100:, [0, 4]] = swapped[100:, [4, 0]]
-    found = mend_labels(CHAIN, swapped)
+    found = correct_labels(CHAIN, swapped)
     assert np.allclose(found.markers_m, clean, equal_nan=True)
     assert found.swapped[60:75].all()
     assert found.swapped[100:].all()
@@ -129,7 +129,7 @@ def test_ghosts_are_dropped():
     clean[50:70, 2] = np.nan
     ghost = clean.copy()
     ghost[50:70, 2] = [0.5, 0.5]
-    found = mend_labels(CHAIN, ghost)
+    found = correct_labels(CHAIN, ghost)
     assert np.allclose(found.markers_m, clean, equal_nan=True)
     assert found.dropped[50:70, 2].all()
     assert found.dropped.sum() == 20
@@ -137,7 +137,7 @@ def test_ghosts_are_dropped():
 
 def test_sound_labels_are_left_alone():
     _, points = gait_track()
-    found = mend_labels(CHAIN, points)
+    found = correct_labels(CHAIN, points)
     assert not found.swapped.any()
     assert np.array_equal(found.markers_m, points)
 

@@ -15,7 +15,7 @@ from srs_opt.errors import InputError
 from srs_opt.measurement.chain import chain_of, headings, link_positions, marker_jacobian, marker_positions
 from srs_opt.measurement.dataset import load_dataset, write_dataset
 from srs_opt.measurement.find_chain import find_chain, symmetric
-from srs_opt.measurement.labels import mend_labels
+from srs_opt.measurement.labels import correct_labels
 from srs_opt.measurement.shape import shape_from_markers
 from srs_opt.measurement.spots import Spot, load_spots, named_layout, spots_of
 from srs_opt.measurement.validate import problems
@@ -132,7 +132,7 @@ def test_swapped_labels_of_chamber_ends_are_mended():
     points = marker_positions(chain, q)
     bad = points.copy()
     bad[10:15, [1, 5]] = bad[10:15, [5, 1]]
-    mended = mend_labels(chain, bad)
+    mended = correct_labels(chain, bad)
     assert np.allclose(mended.markers_m, points)
     assert mended.swapped.sum() == 5
 
