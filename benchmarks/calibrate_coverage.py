@@ -97,7 +97,7 @@ def run(quick: bool) -> Section:
     quick."""
     stored = None if quick else stored_rows("calibrate_coverage")
     if stored is None:
-        stored = "now", [pulls(*seed) for seed in seeds(2 if quick else 4, 1)]
+        stored = "now", [pulls(*seed) for seed in seeds(1 if quick else 4, 1)]
     measured, rows = stored
     return Section(
         "Calibration: do intervals cover the truth?",

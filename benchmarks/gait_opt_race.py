@@ -31,7 +31,7 @@ BEST_M_S = 0.557  # the fastest wave known at 1-2 Hz and 41-55 kPa
 NEAR = 0.99
 STRAIGHT_RAD_S = 0.02
 TURN_COST = 0.5  # m/s per rad/s: what the collocation search's own score takes off
-PATIENCE_S, QUICK_S = 120.0, 2.0  # processor time per method and start
+PATIENCE_S, QUICK_S = 120.0, 0.5  # processor time per method and start
 
 ROBOT = wpi_srs()
 PROBLEM = CycleProblem((ROBOT,), "complex", Goal("speed"), Limits())

@@ -86,12 +86,13 @@ def populations(
 
     They begin at other waves than the searches with the same seed.
     """
-    kept = None if resume is None else Resume(resume, f"population {problem}")
+    evaluations = POPULATION.evaluations
+    kept = None if resume is None else Resume(resume, f"population of {evaluations} {problem}")
     begins = starting_gaits(problem, max(most, POPULATION.together) + 1, seed + _OTHER_SEED)[1:]
     pieces = [(seed + k, start) for k, start in enumerate(begins)]
     totals: list[float] = []
     for k in range(0, len(pieces), POPULATION.together):
-        work = partial(_evolved, problem)
+        work = partial(_evolved, problem, evaluations)
         batch = pieces[k : k + POPULATION.together]
         with executor(jobs, cluster) as where:
             for record in sweep(work, batch, chunk=1, where=where, resume=kept):
@@ -104,10 +105,12 @@ def populations(
             return
 
 
-def _evolved(problem: CycleProblem, pieces: Sequence[tuple[int, Gait]]) -> list[dict[str, Any]]:
+def _evolved(
+    problem: CycleProblem, evaluations: int, pieces: Sequence[tuple[int, Gait]]
+) -> list[dict[str, Any]]:
     found = []
     for seed, start in pieces:
-        gait, total = evolved(problem, start, seed, POPULATION.evaluations)
+        gait, total = evolved(problem, start, seed, evaluations)
         found.append({"gait": gait.record(), "total": total})
     return found
 

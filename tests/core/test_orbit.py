@@ -333,7 +333,7 @@ def test_random_robots_and_gaits_have_steady_states(links):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("links", "seconds"), [(20, 500)])
+@pytest.mark.parametrize(("links", "seconds"), [(16, 400)])
 def test_long_robots_compile_and_run_in_acceptable_time(links, seconds):
     """Compiling grows about linearly with the links; generous limits. Bends of about 1 rad."""
     import os

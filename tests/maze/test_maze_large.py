@@ -28,9 +28,7 @@ print(json.dumps(dict(loaded=loaded, tabled=tabled, exact=exact, peak=peak, node
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("kind", "fill"), [("map", 0.0001), ("yaml", 0.4), ("turned", 0.0001), ("turned", 0.4)]
-)
+@pytest.mark.parametrize(("kind", "fill"), [("map", 0.0001), ("yaml", 0.4), ("turned", 0.4)])
 def test_large_maps(kind, fill, tmp_path):
     wall = np.random.default_rng(0).random((4000, 4000)) < fill
     if kind == "map":

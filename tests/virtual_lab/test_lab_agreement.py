@@ -9,7 +9,8 @@ import pytest
 
 from srs_opt.gait import published_wave
 from srs_opt.robot import wpi_srs
-from srs_opt.simulate.integrate import Integrator
+from srs_opt.simulate import compiled
+from srs_opt.simulate.integrate import Integrator, step_kernel
 from srs_opt.simulate.timeline import Timeline
 from virtual_lab.catalogue import LISTED
 from virtual_lab.draw import draw_effect
@@ -35,12 +36,21 @@ def compare(effects, tolerance_m, **robot_values):
     np.testing.assert_allclose(lab.theta.mean(axis=1), model.pose[:, 2], atol=10 * tolerance_m)
 
 
+@pytest.fixture
+def interpreted(monkeypatch):
+    """Without a compiler: every effect has equations of its own, which compile longer than they run here."""
+    step_kernel.cache_clear()
+    monkeypatch.setattr(compiled, "compiler", lambda: None)
+    yield
+    step_kernel.cache_clear()
+
+
 def test_without_any_effect():
     compare((), 5e-6)
 
 
 @pytest.mark.parametrize("name", sorted(name for name, kind in LISTED.items() if kind.part != "camera"))
-def test_with_one_effect(name):
+def test_with_one_effect(name, interpreted):
     effect = draw_effect(LISTED[name], np.random.default_rng(6), 5, (1.0, 1.0))
     compare((effect,), TOLERANCE_M.get(name, 2e-5))
 
