@@ -7,6 +7,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from srs_opt.calibrate.data_settings import MAP_DATA
+from srs_opt.calibrate.fit_settings import CALIBRATION_REPORT
 from srs_opt.command import (
     Answer,
     Parser,
@@ -70,12 +72,13 @@ def _summary(found: Calibration) -> str:
         lines.append(f"noise per coordinate: {found.noise.in_words}")
     lines += [f"trial {name} set aside: {why}" for name, why in found.set_aside.items()]
     if found.sd_with_tracks is not None:
-        lines.append("from maps alone; 8 s of track of every gait would know better by the factor")
+        track = f"{MAP_DATA.track_s:g} s of track"
+        lines.append(f"from maps alone; {track} of every gait would know better by the factor")
         less = {n: sd / found.sd_with_tracks[n] for n, sd in found.sd.items()}
         lines.append(", ".join(f"{name} {factor:.2g}" for name, factor in less.items()))
     if found.robot.friction_normal < found.robot.friction_tangential:
         lines.append("friction across is below friction along: not so with wheels; are head and tail right?")
-    if found.after > 1.1:
+    if found.after > CALIBRATION_REPORT.unexplained_misfit:
         lines.append("the model does not explain the data: see python -m srs_opt.discrepancy")
     return "\n".join(lines)
 

@@ -28,7 +28,8 @@ def own_scatter(experiment: Experiment, fit: Fit, trials: Sequence[Trial]) -> Po
             excess = normal.misfit / normal.count - 1 - OBJECTIVE.inflation_sd * np.sqrt(2 / normal.count)
             back = normal.eliminated(1 + OBJECTIVE.correlated_values * max(0.0, excess)).back
             now = point.scatter.get(trial.name, np.zeros(back.shape[0]))
-            moved[trial.name] = np.clip(now + back[:, -1], -4 * normal.scatter_sd, 4 * normal.scatter_sd)
+            limit = OUTLYING_TRIAL.most_scatter_sd * normal.scatter_sd
+            moved[trial.name] = np.clip(now + back[:, -1], -limit, limit)
             settled &= bool(np.abs(moved[trial.name] - now).max() < 0.05 * normal.scatter_sd.min())
         if settled:
             break

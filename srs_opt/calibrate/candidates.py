@@ -11,6 +11,7 @@ import numpy as np
 
 from srs_opt.calibrate.coordinates import Coordinate, base_coordinates
 from srs_opt.calibrate.fit import Fit
+from srs_opt.calibrate.fit_settings import DERIVATIVE
 from srs_opt.calibrate.forms import Form, form_of_entry, forms_of
 from srs_opt.effects import all_effects
 from srs_opt.robot import Robot
@@ -88,7 +89,7 @@ def entry_sd(form: Form, fit: Fit) -> dict[str, float]:
     keys = [p.name for p in form.effect.parameters if p is not form.effect.place]
     jacobian = np.zeros((len(keys), len(own)))
     for j, c in enumerate(free):
-        h = 1e-4 * c.typical
+        h = DERIVATIVE.central_step * c.typical
         ends = [form.entry({**values, c.name: values[c.name] + s * h}) for s in (1, -1)]
         for i, key in enumerate(keys):
             change = ends[0][key] - ends[1][key]

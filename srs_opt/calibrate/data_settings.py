@@ -137,6 +137,10 @@ class EntrySettings:
         less; the first two cycles, from rest, smear the right one to 0.9.
     most_off_phase_rad : float
         Of the lag between neighbouring joints; slow valves and bent segments make 0.3.
+    least_frames : int
+        In the track.
+    resolution : float
+        Cycles over the track, by which a frequency that is read off it may be off.
     even_rad : float
         How well the joints' lags must agree to mean anything.
     """
@@ -147,6 +151,8 @@ class EntrySettings:
     most_off_share: float = 0.08
     least_power_share: float = 0.3
     most_off_phase_rad: float = 1.0
+    least_frames: int = 40
+    resolution: float = 0.6
     even_rad: float = 0.5
 
 
@@ -184,6 +190,8 @@ class OutlyingTrialSettings:
         and more.
     notable_misfit : float
         Of the noise's variance: misfit that is worth a refit.
+    most_scatter_sd : float
+        Of a trial that a fit did not see: its own friction and curvature go no further.
     worst_ratio : float
         Times the usual misfit that a trial must have in the fit to all, to be left out as a test.
     """
@@ -191,6 +199,7 @@ class OutlyingTrialSettings:
     least_left: int = 3
     apart_ratio: float = 8.0
     notable_misfit: float = 0.5
+    most_scatter_sd: float = 4.0
     worst_ratio: float = 3.0
 
 

@@ -26,7 +26,7 @@ def contradicted(trial: Trial) -> str:
     best = float(tried[int(np.argmax(power))])
     own, waves = _power(time, turns, entered)
     if (
-        abs(best - entered) > max(ENTRY.most_off_share * entered, 0.6 / duration)
+        abs(best - entered) > max(ENTRY.most_off_share * entered, ENTRY.resolution / duration)
         and own < ENTRY.least_power_share * power.max()
     ):
         return f"the body swings at {best:.2g} Hz, not at the {entered:.3g} Hz that are entered"
@@ -50,7 +50,7 @@ def _swing(trial: Trial) -> tuple[np.ndarray, np.ndarray] | None:
         return None
     whole = np.isfinite(markers).all(axis=(1, 2))
     time = trial.time_s[whole]
-    if time.size < 40 or (time[-1] - time[0]) * trial.frequency_hz < ENTRY.least_cycles:
+    if time.size < ENTRY.least_frames or (time[-1] - time[0]) * trial.frequency_hz < ENTRY.least_cycles:
         return None
     chords = np.diff(markers[whole], axis=1) @ np.array([1, 1j])
     turns = np.angle(chords[:, 1:] * np.conj(chords[:, :-1]))

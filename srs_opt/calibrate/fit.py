@@ -285,14 +285,14 @@ class _Descent:
             self.refresh()
         else:
             self.nonlinear = True
-            self.damping = max(self.damping * 4, FIT.first_damping)
+            self.damping = max(self.damping * FIT.damping_up, FIT.first_damping)
 
     def _adapt_damping(self, gain: float, promised: float) -> None:
         """Damp less where the derivatives were right, more where they were not."""
         if gain < FIT.trusted_share * promised:
             self.damping *= 2
         elif gain > (1 - FIT.trusted_share) * promised:
-            self.damping = 0.0 if self.damping < FIT.least_damping else self.damping * 0.3
+            self.damping = 0.0 if self.damping < FIT.least_damping else self.damping * FIT.damping_down
 
     def _accelerated(self, move: Move) -> Move:
         """Return the step with the second derivative along it taken into account."""

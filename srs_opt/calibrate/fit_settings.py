@@ -39,6 +39,8 @@ class FitSettings:
         Before that is believed.
     catch_up_share : float
         Share of the distance to the one to beat that may be left after each step of a fit that catches up.
+    damping_up, damping_down : float
+        Factors on the damping after a step that lost, and after one whose derivatives were right.
     least_damping, first_damping, most_damping : float
         Relative to the diagonal: below the least none; the first after a step that lost; above the most a fit
         is given up.
@@ -67,6 +69,8 @@ class FitSettings:
     hopeless_share: float = 0.1
     least_iterations: int = 2
     catch_up_share: float = 0.5
+    damping_up: float = 4.0
+    damping_down: float = 0.3
     least_damping: float = 0.001
     first_damping: float = 0.02
     most_damping: float = 1e4
@@ -121,11 +125,15 @@ class DerivativeSettings:
     perturbation : float
         Of a coordinate's typical size: rounding then costs 1e-8 of a derivative, the second derivative of a
         motion through the steepest friction 1e-4.
+    central_step : float
+        Of a typical size, for central differences of what is cheap and smooth: readings, packings, entries.
+        The truncation error is second order in it.
     stiff_share : float
         Of a typical flexibility: a body as stiff as that moves by 0.1 % other than to first order.
     """
 
     perturbation: float = 1e-7
+    central_step: float = 1e-4
     stiff_share: float = 1e-3
 
 
@@ -160,11 +168,14 @@ class CalibrationReportSettings:
     ----------
     off_bench_sd : float
         Standard deviations of the bench; by chance one value in 370 lies further off.
+    unexplained_misfit : float
+        Root mean square misfit over the noise from which it is said that the model does not explain the data.
     uninformed_share : float
         Posterior over prior deviation above which the data told nothing.
     """
 
     off_bench_sd: float = 3.0
+    unexplained_misfit: float = 1.1
     uninformed_share: float = 0.9
 
 

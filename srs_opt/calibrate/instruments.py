@@ -11,7 +11,7 @@ import casadi as ca
 import numpy as np
 
 from srs_opt.calibrate.coordinates import SCATTER_SD, Coordinate
-from srs_opt.calibrate.fit_settings import PRIOR
+from srs_opt.calibrate.fit_settings import DERIVATIVE, PRIOR
 from srs_opt.calibrate.model import Conditions, Model, Values
 from srs_opt.calibrate.normal_equations import NormalEquations
 from srs_opt.effects import known_effects
@@ -146,7 +146,7 @@ def reading_equations(
     for i, reading in enumerate(found):
         rows[i, -1] = (reading.value - reading.expected(now)) / reading.sd
         for k, c in enumerate(coordinates):
-            h = 1e-4 * c.typical
+            h = DERIVATIVE.central_step * c.typical
             ends = [reading.expected({**now, c.name: now[c.name] + s * h}) for s in (1, -1)]
             rows[i, k] = (ends[0] - ends[1]) / (2 * h) / reading.sd
     none = np.zeros(0)

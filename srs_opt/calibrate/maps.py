@@ -12,6 +12,7 @@ from srs_opt.calibrate.coordinates import SCATTER_SD, Coordinate, base_coordinat
 from srs_opt.calibrate.data_settings import MAP_DATA
 from srs_opt.calibrate.experiment import Experiment, Point
 from srs_opt.calibrate.fit import fit, start_point
+from srs_opt.calibrate.fit_settings import DERIVATIVE
 from srs_opt.calibrate.forms import form_of_entry
 from srs_opt.calibrate.model import Model
 from srs_opt.calibrate.normal_equations import NormalEquations, solve
@@ -134,12 +135,12 @@ def parameter_moves(
     """Return the derivatives of the model's parameters, by name, by one coordinate of a fit.
 
     By central differences of the packing, which is smooth where an effect is present: their error is
-    second order in a ten-thousandth of the effect's typical size.
+    second order in `DerivativeSettings.central_step`.
     """
     if not coordinate.effect:
         name = coordinate.name
         return {name: getattr(robot, name) * math.exp(values.get(name, 0.0))}
-    h = 1e-4 * coordinate.typical
+    h = DERIVATIVE.central_step * coordinate.typical
     here = values.get(coordinate.name, coordinate.start)
     ends = []
     for side in (1, -1):

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from srs_opt.calibrate.experiment import Experiment, Point
+from srs_opt.calibrate.fit_settings import DERIVATIVE
 from srs_opt.calibrate.instruments import check_expectations
 from srs_opt.calibrate.normal_equations import bounded_solve
 from srs_opt.discrepancy.gap_settings import DESIGN
@@ -123,7 +124,7 @@ def _reading_variance(expected: Callable[[Mapping[str, float]], float], h: Hypot
     values = h.fit.point.values
     jacobian = np.zeros(len(h.fit.coordinates))
     for k, c in enumerate(h.fit.coordinates):
-        step = 1e-4 * c.typical
+        step = DERIVATIVE.central_step * c.typical
         ends = [expected({**values, c.name: values[c.name] + s * step}) for s in (1, -1)]
         jacobian[k] = (ends[0] - ends[1]) / (2 * step)
     return float(jacobian @ h.fit.covariance @ jacobian)

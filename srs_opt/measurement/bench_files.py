@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from srs_opt.measurement.plausible import bend_rad
 from srs_opt.measurement.records import (
     CONDITIONS,
     DIRECTIONS,
@@ -18,6 +19,7 @@ from srs_opt.measurement.records import (
     StepTest,
     TowTest,
 )
+from srs_opt.measurement.take_settings import TRACK_CHECK
 from srs_opt.problem import Report
 from srs_opt.robot import Robot
 from srs_opt.table import Row, read_rows
@@ -75,10 +77,11 @@ def read_map_rows(file: str, report: Report) -> list[MapRow]:
 
 
 def _check_maps(rows: list[MapRow], robot: Robot, report: Report) -> None:
+    fastest = TRACK_CHECK.top_speed_body
     checks = (
-        ("speed_m_s", [abs(r.speed_m_s) / robot.length_m for r in rows], 25.0, 3e-3, "mm/s", "km/s"),
+        ("speed_m_s", [abs(r.speed_m_s) / robot.length_m for r in rows], fastest, 3e-3, "mm/s", "km/s"),
         ("radius_m", [abs(r.radius_m) / robot.length_m for r in rows if r.radius_m], 50.0, 0.02, "mm", "km"),
-        ("pressure_kpa", [_bend(r.pressure_kpa, robot) for r in rows], 2 * math.pi, 0.01, "Pa", "MPa"),
+        ("pressure_kpa", [bend_rad(r.pressure_kpa, robot) for r in rows], 2 * math.pi, 0.01, "Pa", "MPa"),
         ("phase_lag_rad", [abs(r.phase_lag_rad) for r in rows], 2 * math.pi + 1e-3, 0.0, "degrees", ""),
         ("frequency_hz", [r.frequency_hz for r in rows], 100.0, 0.02, "mHz", "kHz"),
     )
@@ -91,10 +94,6 @@ def _check_maps(rows: list[MapRow], robot: Robot, report: Report) -> None:
             report.error("maps.csv", None, f"{column}: far too large for this robot (in {unit_high}?)")
         elif middle < low:
             report.error("maps.csv", None, f"{column}: far too small for this robot (in {unit_low}?)")
-
-
-def _bend(pressure_kpa: float, robot: Robot) -> float:
-    return robot.curvature_per_pressure_1_m_kpa * pressure_kpa * robot.segment_length_m
 
 
 def read_bench(folder: Path, robot: Robot, report: Report) -> Bench:
@@ -158,7 +157,7 @@ def _check_step(test: StepTest, line: int, robot: Robot, report: Report) -> None
             file, line, f"test '{test.test}' lasts {time[-1] - time[0]:g} s, far too short (in kiloseconds?)"
         )
     expected = robot.curvature_per_pressure_1_m_kpa * test.pressure_kpa
-    if _bend(test.pressure_kpa, robot) > 2 * math.pi or test.pressure_kpa <= 0:
+    if bend_rad(test.pressure_kpa, robot) > 2 * math.pi or test.pressure_kpa <= 0:
         message = f"pressure_kpa: {test.pressure_kpa:g} kPa cannot be meant (in pascals?)"
         report.error(file, line, message)
     elif not 0.02 < float(np.abs(test.curvature_1_m).max()) / max(expected, 1e-9) < 50:
@@ -193,7 +192,7 @@ def _read_tow(robot: Robot, report: Report) -> tuple[TowTest, ...]:
     for row in read_rows(file, TOW_COLUMNS, (), report):
         speed, force = row.number("speed_m_s", report), row.number("force_n", report)
         with_tether = row.yes("with_tether", True, report)
-        if abs(speed) > 25 * robot.length_m:
+        if abs(speed) > TRACK_CHECK.top_speed_body * robot.length_m:
             report.error(file, row.line, f"speed_m_s: {speed:g} m/s is too fast (in mm/s?)")
         if abs(force) > 10 * weight:
             message = f"force_n: {force:g} N is over ten times the robot's weight of {weight:.3g} N"

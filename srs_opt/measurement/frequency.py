@@ -70,12 +70,13 @@ def seen_frequency(time_s: Array, tracks: Array, nominal_hz: float) -> SeenFrequ
     found = minimize_scalar(left, bounds=(grid[k - 1], grid[k + 1]), method="bounded", options=options)
     step = 0.05 / span
     here = float(found.fun)
-    bend = (left(found.x + step) + left(found.x - step) - 2 * here) / step**2
+    # second derivative of the sum of squares: twice the information on the frequency, times the variance
+    second = (left(found.x + step) + left(found.x - step) - 2 * here) / step**2
     values = sum(len(t) for t, _ in signals)
     # what is left is smooth in time: a cycle's samples count as two per harmonic
     independent = min(values, 2 * FREQUENCY.harmonics * span * nominal_hz * len(signals))
     variance = here / values * (values / independent)
-    return SeenFrequency(float(found.x), math.sqrt(2 * variance / max(bend, 1e-30)))
+    return SeenFrequency(float(found.x), math.sqrt(2 * variance / max(second, 1e-30)))
 
 
 def far_frequency(time_s: Array, tracks: Array, nominal_hz: float) -> float | None:

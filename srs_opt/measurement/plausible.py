@@ -24,6 +24,11 @@ def factor_of_thousand(ratio: float) -> str:
     return ""
 
 
+def bend_rad(pressure_kpa: float, robot: Robot) -> float:
+    """Return by how much a pressure bends a segment, rad."""
+    return robot.curvature_per_pressure_1_m_kpa * pressure_kpa * robot.segment_length_m
+
+
 def check_robot(robot: Robot, file: str, report: Report) -> None:
     """Report a robot whose mass or size cannot be meant in kg and m."""
     density = robot.link_mass_kg / (robot.pitch_m * max(robot.body_width_m, 1e-3) ** 2)
@@ -58,7 +63,7 @@ def check_trial_row(
         _check_frequency(row, frequency, duration, rate_hz, report)
     elif frequency < 0:
         error(f"frequency_hz: must not be negative, found {frequency:g}")
-    bend = robot.curvature_per_pressure_1_m_kpa * pressure * robot.segment_length_m
+    bend = bend_rad(pressure, robot)
     if pressure < 0:
         error(f"pressure_kpa: must not be negative, found {pressure:g}")
     elif bend > TURN:

@@ -190,13 +190,13 @@ def time_constants(s: float, q: float, covariance: Array) -> tuple[TimeConstant,
     nodes = ndtri((np.arange(STEP_TEST.grid) + 0.5) / STEP_TEST.grid)
     root = np.linalg.cholesky(covariance + np.diag([1e-18, 1e-18]))
     u, v = np.meshgrid(nodes, nodes, indexing="ij")
-    slope = covariance[0, 1] / covariance[1, 1] if covariance[1, 1] > 0 else 0.0
+    regression = covariance[0, 1] / covariance[1, 1] if covariance[1, 1] > 0 else 0.0
     squares = q + root[1, 0] * u + root[1, 1] * v
-    means = s + root[0, 0] * u - slope * np.minimum(squares, 0.0)
+    means = s + root[0, 0] * u - regression * np.minimum(squares, 0.0)
     roots = np.sqrt(np.clip(squares, 0.0, STEP_TEST.largest_q))
-    mean, best = s - slope * min(q, 0.0), float(np.sqrt(np.clip(q, 0.0, STEP_TEST.largest_q)))
-    equal = s - slope * q
-    reach = 1.645 * float(np.sqrt(max(covariance[0, 0] - slope * covariance[0, 1], 0.0)))
+    mean, best = s - regression * min(q, 0.0), float(np.sqrt(np.clip(q, 0.0, STEP_TEST.largest_q)))
+    equal = s - regression * q
+    reach = 1.645 * float(np.sqrt(max(covariance[0, 0] - regression * covariance[0, 1], 0.0)))
     found = []
     for sign in (1, -1):
         centre, spread = mean * (1 + sign * best), means * (1 + sign * roots)

@@ -222,6 +222,20 @@ class TrackCheckSettings:
         From the origin; a fit to 1e308 m ends in not-a-number, not in an answer.
     top_speed_body : float
         Body lengths per second: more can only be another unit.
+    most_lost_share : float
+        Of the marker positions, without a warning.
+    rate_share : float
+        By which the time between samples may differ from the stated rate's.
+    spacing : tuple
+        Distance of neighbouring markers over that of the straight robot: a bent segment shortens it, another
+        unit or another order of the markers is beyond.
+    most_off_start_rad : float
+        Between the heading at the start and the entered one, without a warning.
+    most_off_duration : float
+        Share by which a track's length may differ from the entered duration and still only be warned of.
+    odd_noise, impossible_noise : float
+        Factors, up or down, between the noise that a track shows and the stated one, from which on it is
+        warned of, and refused.
     least_differences : int
         From which on the noise that a track shows is compared with what is stated.
     """
@@ -229,6 +243,13 @@ class TrackCheckSettings:
     most_missing_rows: int = 5
     farthest_m: float = 1e5
     top_speed_body: float = 25.0
+    most_lost_share: float = 0.2
+    rate_share: float = 0.02
+    spacing: tuple[float, float] = (0.6, 1.5)
+    most_off_start_rad: float = 0.2
+    most_off_duration: float = 0.2
+    odd_noise: float = 5.0
+    impossible_noise: float = 200.0
     least_differences: int = 100
 
 

@@ -103,7 +103,7 @@ def check_track(
     good_clock = _check_clock(trial, track, rate_hz, report)
     for marker in np.flatnonzero(lost.all(axis=0)):
         report.warn(track.file, None, f"marker {marker + 1} is never seen")
-    if lost.mean() > 0.2:
+    if lost.mean() > TRACK_CHECK.most_lost_share:
         report.warn(track.file, None, f"{100 * lost.mean():.0f} % of the marker positions are lost")
     if track.points_m.shape[1] > 1:
         chain = chain_of(robot, trial.spots)
@@ -129,7 +129,7 @@ def _check_clock(trial: Trial, track: Track, rate_hz: float, report: Report) -> 
     step = 1 / rate_hz if rate_hz > 0 else float(np.median(steps))
     typical = float(np.median(steps))
     scale = factor_of_thousand(typical / step) if typical > 0 else ""
-    if typical > 0 and not 0.98 < typical / step < 1.02:
+    if typical > 0 and abs(typical / step - 1) >= TRACK_CHECK.rate_share:
         reason = f"time_s in {scale}seconds?" if scale else "is camera.rate_hz right?"
         report.error(
             file, lines[0], f"samples lie {typical:g} s apart and camera.rate_hz says {step:g} s: {reason}"
@@ -167,7 +167,7 @@ def _check_duration(trial: Trial, span: float, step: float, file: str, line: int
     message = f"the track lasts {span:.4g} s and trials.csv says duration_s {wanted:g}"
     if scale:
         report.error(file, line, f"{message}: {scale}seconds there?")
-    elif abs(span - wanted) > 0.2 * wanted:
+    elif abs(span - wanted) > TRACK_CHECK.most_off_duration * wanted:
         report.error(file, line, message)
     else:
         report.warn(file, line, message)
@@ -178,7 +178,7 @@ def _check_spacing(track: Track, chain: Chain, report: Report) -> bool:
     if np.isnan(chords).all():
         return True
     ratio = float(np.nanquantile(chords / chain.spacing_m, 0.75))
-    if 0.6 < ratio < 1.5:
+    if TRACK_CHECK.spacing[0] < ratio < TRACK_CHECK.spacing[1]:
         return True
     spacing = float(chain.spacing_m.mean())
     found = ratio * spacing
@@ -215,10 +215,11 @@ def _check_start(trial: Trial, track: Track, chain: Chain, length_m: float, repo
     gap = math.remainder(heading - trial.heading_rad, 2 * math.pi)
     degrees = math.remainder(heading - math.radians(trial.heading_rad), 2 * math.pi)
     start = start - rotation_matrix(heading) @ chain.straight_m[0]
-    if abs(gap) > 2.9 and abs(degrees) > 0.2:
+    limit = TRACK_CHECK.most_off_start_rad
+    if abs(gap) > 2.9 and abs(degrees) > limit:
         report.error(track.file, track.lines[0], "the markers run head to tail, expected tail to head")
-    elif abs(gap) > 0.2:
-        hint = " (given in degrees?)" if abs(degrees) < 0.2 else ""
+    elif abs(gap) > limit:
+        hint = " (given in degrees?)" if abs(degrees) < limit else ""
         message = f"the robot starts {gap:+.2f} rad away from its heading_rad {trial.heading_rad:g}{hint}"
         report.warn(track.file, track.lines[0], message)
     if np.linalg.norm(start) > length_m:
@@ -250,7 +251,8 @@ def _check_noise(track: Track, marker_sd_m: float, report: Report) -> None:
         return
     ratio = noise_sd(track.points_m, TRACK_CHECK.least_differences) / marker_sd_m
     message = f"marker noise is {ratio:.2g} times camera.marker_sd_m ({marker_sd_m:g} m)"
-    if ratio > 200 or 0 < ratio < 1 / 200:
+    factor = max(ratio, 1 / ratio) if ratio > 0 else 1.0
+    if factor > TRACK_CHECK.impossible_noise:
         report.error(track.file, None, f"{message}: units?")
-    elif ratio > 5 or 0 < ratio < 0.2:
+    elif factor > TRACK_CHECK.odd_noise:
         report.warn(track.file, None, message)
