@@ -58,6 +58,8 @@ class Explanation:
         The least that a weaker gait outside the table needs.
     start_clearance_m, margin_m : float
         Of the straight robot at the start; what is to be kept.
+    unknown_walls : bool
+        Whether cells that nobody has seen are taken for walls.
     """
 
     tightest: Tightest | None
@@ -66,6 +68,7 @@ class Explanation:
     outside_needs_m: float | None
     start_clearance_m: float
     margin_m: float
+    unknown_walls: bool = False
 
     @property
     def too_narrow(self) -> bool:
@@ -74,6 +77,12 @@ class Explanation:
 
     def in_words(self, what: str | None) -> str:
         """Return the explanation in a few sentences, `what` first."""
+        said = self._sentences(what)
+        if self.unknown_walls and self.start_clearance_m >= self.margin_m - ROUNDING_M:
+            said.append("Cells that nobody has seen count as walls (--unknown free: as free).")
+        return " ".join(said).strip()
+
+    def _sentences(self, what: str | None) -> list[str]:
         said = [f"{what}." if what else ""]
         t = self.tightest
         if self.start_clearance_m < self.margin_m - ROUNDING_M:
@@ -83,9 +92,9 @@ class Explanation:
                 "choose a smaller --margin."
             )
             if t is not None:  # the tightest place would be the start's doing
-                return " ".join(said).strip()
+                return said
         if t is None:
-            return " ".join([*said, "Walls separate the start from the goal completely."]).strip()
+            return [*said, "Walls separate the start from the goal completely."]
         said.append(
             f"The tightest place on the widest route is at ({t.x_m:.3f}, {t.y_m:.3f}), "
             f"{t.width_m:.3f} m wide."
@@ -100,20 +109,20 @@ class Explanation:
                 "So the widths alone do not rule a way out; what was tried found none, which is no proof "
                 "that there is none."
             )
-            return " ".join(said).strip()
+            return said
         if t.width_m < self.body_needs_m:
             said.append(
                 f"No gait at all would fit: the body and its margins are {self.body_needs_m:.3f} m wide. "
                 "That is a proof."
             )
-            return " ".join(said).strip()
+            return said
         if self.outside_needs_m is not None:
             verb = "would fit" if self.outside_needs_m <= t.width_m else "would not fit either"
             said.append(f"A weaker gait outside the table needs {self.outside_needs_m:.3f} m and {verb}.")
         else:
             said.append("None of the weaker gaits that were tried outside the table moves the robot.")
         said.append("Gaits are judged by what they sweep in their steady state.")
-        return " ".join(said).strip()
+        return said
 
     def to_record(self) -> dict[str, Any]:
         """Return the facts for the command's JSON."""
@@ -138,7 +147,11 @@ def explain(problem: Problem) -> Explanation:
         outside = _slimmest_outside(problem, needs[0][0])
     size = RobotSize(problem.robot.length_m, problem.robot.body_width_m / 2, problem.margin_m)
     room = problem.maze.clearance(size.straight_body(problem.start))
-    return Explanation(tightest, needs, body, outside, room, problem.margin_m)
+    raster = problem.maze.raster
+    unseen = (
+        raster is not None and raster.unknown is not None and bool((raster.occupied & raster.unknown).any())
+    )
+    return Explanation(tightest, needs, body, outside, room, problem.margin_m, unseen)
 
 
 def no_body_fits(problem: Problem) -> bool:

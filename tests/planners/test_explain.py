@@ -1,6 +1,10 @@
+from dataclasses import replace
+
+import numpy as np
 import pytest
 from planner_rooms import corridor, gate, maze_of
 
+from planners.maze.raster import Raster
 from planners.plan.explain import explain, gait_needs, narrower_than_any_gait, tightest_place
 from planners.view.obstruction import obstruction_figure
 from srs_opt.figures import save_figure
@@ -30,6 +34,17 @@ def test_closed_wall_is_said(problem_in, tmp_path):
     assert explanation.to_record()["width_m"] is None
     for picture in save_figure(obstruction_figure(problem, explanation), tmp_path / "why"):
         assert picture.stat().st_size > 1000
+
+
+def test_unseen_cells_that_count_as_walls_are_said(problem_in):
+    unseen = np.zeros((30, 100), dtype=bool)
+    unseen[:, 50] = True
+    maze = maze_of((0, 0, 2, 0.6), (0.25, 0.3, 0), (1.7, 0.3, 0.08), [])
+    walled = replace(maze, raster=Raster(unseen, 0.02, unknown=unseen))
+    words = explain(problem_in(walled)).in_words(None)
+    assert "completely" in words and "--unknown free" in words
+    seen = replace(maze, raster=Raster(unseen, 0.02))
+    assert "--unknown" not in explain(problem_in(seen)).in_words(None)
 
 
 def test_words_name_place_width_and_needs(problem_in, gaits, tmp_path):
