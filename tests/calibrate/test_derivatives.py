@@ -57,7 +57,7 @@ def setting():
         "clock_offset.offset_s",
     ],
 )
-def test_slopes_are_those_of_the_prediction(setting, name):
+def test_derivatives_are_those_of_the_prediction(setting, name):
     experiment, values, coordinates, jacobian = setting
     k = [c.name for c in coordinates].index(name)
     h = 2e-3 * coordinates[k].typical
@@ -84,7 +84,7 @@ def test_a_dead_time_is_a_late_clock(setting):
 
 
 def test_a_camera_that_sees_its_markers_one_after_the_other():
-    """Each marker is seen where it is its own lag later; the slope is that of the prediction."""
+    """Each marker is seen where it is its own lag later; the derivative is that of the prediction."""
     robot, lag_s = wpi_srs(), 0.02
     time_s = np.arange(40) / 50
     trials = [
@@ -99,12 +99,12 @@ def test_a_camera_that_sees_its_markers_one_after_the_other():
         plain = work.predict(f"t{k}", Point(values)).points
         assert late[:, 2 * k : 2 * k + 2] == pytest.approx(plain[:, 2 * k : 2 * k + 2], abs=2e-5)
     (size,) = (c for f in work.model.forms for c in f.sizes if c.name == name)
-    slope = work.predict("t0", Point({**values, name: lag_s}), (size,)).jacobian[:, :, 0]
+    derivative = work.predict("t0", Point({**values, name: lag_s}), (size,)).jacobian[:, :, 0]
     ends = [work.predict("t0", Point({**values, name: lag_s + h})).points for h in (1e-3, -1e-3)]
-    assert slope == pytest.approx((ends[0] - ends[1]) / 2e-3, abs=0.02)
+    assert derivative == pytest.approx((ends[0] - ends[1]) / 2e-3, abs=0.02)
 
 
-def test_slopes_of_the_same_place_serve_again_whoever_is_asked(setting, monkeypatch):
+def test_derivatives_of_the_same_place_serve_again_whoever_is_asked(setting, monkeypatch):
     """A place is simulated and derived once; a worker that is handed the memory gives the same bits."""
     robot, coordinates = wpi_srs(), setting[2]
     base = base_coordinates(robot)

@@ -23,7 +23,7 @@ FINE = 1e-8
 
 @pytest.mark.parametrize("offset", [0.0, -0.4])
 @pytest.mark.parametrize("model", ["complex", "simplified"])
-def test_slopes_are_those_of_whole_solutions(offset, model):
+def test_derivatives_are_those_of_whole_solutions(offset, model):
     robot = wpi_srs()
     base = base_coordinates(robot)
     gait = Wave.uniform(robot.segments, 1.5, 48.0, math.pi / 2, offset).gait()
@@ -58,7 +58,7 @@ DRAG = {"name": "tether_drag", "force_n": 0.02, "sd": {"force_n": 0.02}}
 BIAS = {"name": "segment_bias", "segment": 2, "bias": 0.4, "sd": {"bias": 0.5}}
 
 
-def test_slopes_of_a_robots_own_effects_are_those_of_whole_solutions():
+def test_derivatives_of_a_robots_own_effects_are_those_of_whole_solutions():
     robot = wpi_srs().with_values(effects=[DRAG, BIAS])
     gait = Wave.uniform(robot.segments, 1.5, 48.0, math.pi / 2, 0.2).gait()
     coordinates = fitted_coordinates(robot)[-2:]

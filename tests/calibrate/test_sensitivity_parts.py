@@ -35,7 +35,7 @@ def setting():
     return Experiment(Model(robot), [trial], 0.001), trial, base, start_point(base)
 
 
-def test_the_small_structure_gives_the_slopes_of_the_full_one(setting):
+def test_the_small_structure_gives_the_derivatives_of_the_full_one(setting):
     experiment, trial, base, start = setting
     model = experiment.model
     effects = tuple(c for k in all_candidates(model.links) for c in k.sizes)
@@ -85,7 +85,7 @@ def test_differences_are_the_tangents_of_the_integration(setting, effects):
             assert error < 1e-3 * np.abs(theirs).max() + 100 * rounding, coordinates[k].name
 
 
-def test_slopes_of_a_calibration_are_exact(setting):
+def test_derivatives_of_a_calibration_are_exact(setting):
     experiment, trial, base, start = setting
     fine, h = 1e-7, 1e-4
     jacobian = experiment.work.predict(trial.name, start, base, fine).jacobian

@@ -111,7 +111,7 @@ def track():
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_slopes_of_the_picture_are_those_of_differences(track, name):
+def test_derivatives_of_the_picture_are_those_of_differences(track, name):
     fine = 2e-8
     start = start_point(fitted_coordinates(wpi_srs())).values
     form = forms_of(all_effects()[name], 5)[-1]

@@ -27,10 +27,10 @@ def taus(s, q):
 def test_response_solves_the_equation_of_motion(q):
     one, two = taus(0.065, q)
 
-    def slope(_, y):
+    def rate(_, y):
         return [y[1], -(1 / one + 1 / two) * y[1] + (1 - y[0]) / (one * two)]
 
-    exact = solve_ivp(slope, (0, 1.5), [0, 0], t_eval=TIME, rtol=1e-10, atol=1e-12, method="DOP853").y[0]
+    exact = solve_ivp(rate, (0, 1.5), [0, 0], t_eval=TIME, rtol=1e-10, atol=1e-12, method="DOP853").y[0]
     assert np.allclose(step_response(TIME, 0.065, q), exact, atol=1e-8)
 
 

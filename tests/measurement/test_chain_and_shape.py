@@ -66,10 +66,10 @@ def test_geometry_agrees_with_the_models():
 
 def test_jacobian():
     q = some_configurations()
-    slopes = position_jacobian(CHAIN, q)
+    jacobian = position_jacobian(CHAIN, q)
     for k, step in enumerate(1e-6 * np.eye(7)):
         numeric = (link_positions(CHAIN, q + step) - link_positions(CHAIN, q - step)) / 2e-6
-        assert np.allclose(slopes[..., k], numeric, atol=1e-8)
+        assert np.allclose(jacobian[..., k], numeric, atol=1e-8)
 
 
 def test_exact_markers_give_the_exact_shape():

@@ -56,17 +56,17 @@ def walked(spot, q, steps=4000):
 
 
 @pytest.mark.parametrize("spots", [ENDS, ODD], ids=["ends", "odd"])
-def test_places_and_slopes(spots):
+def test_places_and_derivatives(spots):
     chain = chain_of(ROBOT, spots)
     q = some(3)
     found = marker_positions(chain, q)
     for k in range(2):
         assert np.allclose(found[k], [walked(spot, q[k]) for spot in spots], atol=1e-8)
-    slopes = marker_jacobian(chain, q)
+    jacobian = marker_jacobian(chain, q)
     for j in range(7):
         step = 1e-6 * np.eye(7)[j]
         numeric = (marker_positions(chain, q + step) - marker_positions(chain, q - step)) / 2e-6
-        assert np.allclose(slopes[..., j], numeric, atol=1e-7)
+        assert np.allclose(jacobian[..., j], numeric, atol=1e-7)
 
 
 @pytest.mark.parametrize("ratio", [False, True])
