@@ -102,6 +102,7 @@ def _deviance(noise: Noise, data: Sequence[_Distances]) -> float:
             if len(own) <= 2 * size:
                 continue
             both = own.T @ own
+            # restricted likelihood: what the free columns leave, and the log determinant of their information
             rest = both[0, 0] - both[0, 1:] @ np.linalg.solve(both[1:, 1:], both[1:, 0])
             total += float(rest + np.linalg.slogdet(both[1:, 1:])[1])
     return total

@@ -321,6 +321,7 @@ class _Descent:
         (point, equations), (moved, new_equations) = before, after
         step = np.array([moved.values[c.name] - point.values[c.name] for c in self.coordinates])
 
+        # a trial's own part of the objective: its misfit and the prior of its scatter
         def own(normal: NormalEquations) -> float:
             return normal.misfit / inflation + float(np.sum((normal.scatter_now / normal.scatter_sd) ** 2))
 

@@ -75,6 +75,7 @@ class NormalEquations:
         inner = whole[np.ix_(index, index)] + np.diag(precision)
         cross = whole[index].copy()
         cross[:, -1] -= self.scatter_now * precision
+        # Gaussian integral over b: log det (I + P Z'Z/sd^2), so that deviances of different models compare
         log_det = float(np.linalg.slogdet(inner)[1] - np.sum(np.log(precision)))
         at_point = self.misfit / inflation + float(np.sum(self.scatter_now**2 * precision))
         matrix = whole.copy()
@@ -89,6 +90,7 @@ class NormalEquations:
             matrix[-1, :-1] = matrix[:-1, -1]
             cross[:, -1] -= inner @ move
             back[~free, -1] = move[~free]
+        # Schur complement: what is left of the shared coordinates when the scatter follows them
         damped = inner + damping * np.diag(np.diag(inner))
         back[free] = np.linalg.solve(damped[np.ix_(free, free)], cross[free])
         matrix -= cross[free].T @ back[free]
@@ -233,6 +235,7 @@ def solve(total: np.ndarray, chosen: Sequence[int], precision: np.ndarray, offse
     index = np.asarray(chosen, dtype=int)
     a = total[np.ix_(index, index)] + np.diag(precision[index])
     g = total[index, -1] - precision[index] * offset[index]
+    # scaled to unit diagonal first: the rank would else depend on the coordinates' units
     scale = 1 / np.sqrt(np.maximum(np.diag(a), 1e-300))
     inverse = np.linalg.pinv(a * scale[:, None] * scale, rcond=OBJECTIVE.least_eigenvalue, hermitian=True)
     inverse *= scale[:, None] * scale

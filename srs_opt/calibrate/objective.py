@@ -33,6 +33,7 @@ def variance_inflation_of(equations: Mapping[str, NormalEquations], correlated: 
     count as one; without this, thousands of frames would pull the parameters far from their bench values.
     """
     correlated = OBJECTIVE.correlated_values if correlated is None else correlated
+    # the misfit of pure noise has mean count and variance 2 count: no inflation below inflation_sd deviations
     count, ratio = sum(g.count for g in equations.values()), misfit_ratio(equations)
     return 1 + correlated * max(0.0, ratio - 1 - OBJECTIVE.inflation_sd * math.sqrt(2 / count))
 

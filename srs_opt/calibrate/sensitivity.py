@@ -73,6 +73,7 @@ def variation(
         unmoved = np.concatenate([nodes.body[:, :3], nodes.shape(layout)], axis=1)[..., None]
     else:
         unmoved, moved = moved[..., :1], moved[..., 1:]
+    # one-sided: the error is first order in the step, whose size weighs it against rounding (`perturbation`)
     jacobian = (moved - unmoved) / step
     return Variation(jacobian[:, :3], jacobian[:, 3:])
 

@@ -37,6 +37,8 @@ class Whitening:
         self._rows = frame * seen.shape[1] + channel
         first = np.append(True, channel[1:] != channel[:-1])
         lag = np.abs(np.diff(time_s[frame], prepend=0.0))
+        # a = exp(-dt/tau), 0 at a coordinate's first value; var(u_i) = walk (1 - a^2) + white (1 + a^2), the
+        # latter from both values, and cov(u_i, u_(i-1)) = -white a
         self._keep = np.where(first, 0.0, np.exp(-lag / noise.correlation_s))
         white, walk = noise.white_sd_m**2, noise.correlated_sd_m**2
         banded = np.empty((2, self._rows.size))

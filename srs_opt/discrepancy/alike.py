@@ -62,6 +62,7 @@ class Angles:
         first, second = self.columns(a), self.columns(b)
         if not first or not second:
             return None
+        # principal angles between the subspaces that the candidates' columns span, orthonormalised
         cosines = _root(self._seen[np.ix_(first, first)]) @ self._seen[np.ix_(first, second)]
         cosines = cosines @ _root(self._seen[np.ix_(second, second)])
         if len(first) == len(second) == 1 and self._lower[first[0]] == self._lower[second[0]] == 0:

@@ -107,6 +107,7 @@ def power(gain: float) -> float:
     """Return the probability that a separation of expected deviance `gain` exceeds the level that decides."""
     from scipy.special import chndtr
 
+    # the deviance between two hypotheses is chi squared, one degree of freedom, noncentral by its expectation
     return float(1 - chndtr(DESIGN.decisive_deviance, 1, max(gain, 1e-9)))
 
 

@@ -131,6 +131,7 @@ def open_seal(
     if rival is not None and ratio is not None:
         rival_m = _remainder(trials, sealed_residuals(experiment, rival, trials), correlated_m, length_m).m
     remainders = [_remainder(trials, r, correlated_m, length_m) for r in (first, second)]
+    # what a mean product of independent noise is by chance (sd^2/sqrt(n)), times four, as a root mean square
     error = sizes[2] * float(np.sqrt(4 / np.sqrt(max(total[4], 1.0))))
     return Gap(*sizes, ratio, interval, len(trials), remainders[0], remainders[1], error, rival_m)
 

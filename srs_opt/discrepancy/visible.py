@@ -130,6 +130,7 @@ def _least(information: float, whole: float, candidate: Candidate, family: int) 
     """
     if information <= 1e-9 * whole:
         return float("inf")
+    # the estimate's deviation is information^(-1/2); the effect is found when it is so many of them off zero
     return _needed(candidate, family) / float(np.sqrt(information))
 
 

@@ -91,6 +91,7 @@ def link_positions(chain: Chain, q: Array) -> Array:
     """Return the links' positions, shape (..., N, 2), of configurations `q`, shape (..., N + 2)."""
     theta = headings(chain, q)
     middle = (theta[..., :-1] + theta[..., 1:]) / 2
+    # (3): the chord of an arc of length l, l S(l kappa / 2), along the mean heading of its ends
     length, _ = _sinc(chain.segment_length_m * q[..., 3:] / 2)
     gaps = chain.gap_length_m / 2 * (unit_vectors(theta[..., :-1]) + unit_vectors(theta[..., 1:]))
     steps = gaps + chain.segment_length_m * length[..., None] * unit_vectors(middle)

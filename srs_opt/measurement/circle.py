@@ -83,6 +83,7 @@ def taubin(points: Array) -> Array:
     mean = float(square.mean())
     if mean == 0:
         raise NoAnswerError("all points are the same: no circle fits them")
+    # least singular vector of (z, x, y) with the squares z centred and scaled: Taubin's normalisation
     table = np.column_stack([(square - mean) / (2 * np.sqrt(mean)), centred])
     _, _, right = np.linalg.svd(table, full_matrices=False)
     a = right[2].copy()

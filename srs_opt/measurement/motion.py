@@ -184,6 +184,7 @@ def _interval(value: float, replicas: list[float], confidence: float) -> Interva
     from scipy.stats import t as student
 
     count = len(replicas)
+    # delete-a-group jackknife
     sd = math.sqrt((count - 1) / count * float(((np.array(replicas) - np.mean(replicas)) ** 2).sum()))
     reach = float(student.ppf(0.5 + confidence / 2, count - 1)) * sd
     return Interval(value, sd, value - reach, value + reach)

@@ -81,7 +81,7 @@ def find_onset(
     low, high = max(centre - settle, float(time_s[0])), centre + float(np.median(np.diff(time_s)))
     grid = np.linspace(low, centre, ONSET.grid)
     found = _fitted(robot, wave, time, points, chain_of(robot, spots), grid, (low, high))
-    bracket = float((high - low) / np.sqrt(12))
+    bracket = float((high - low) / np.sqrt(12))  # the deviation of what lies anywhere in an interval
     if found.left > ONSET.most_left or found.edge:
         # the start may lie before the first frame, and what was taken for rest be the slow first bend
         running = running or find_phase(robot, wave, time_s, markers_m, spots)

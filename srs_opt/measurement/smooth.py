@@ -218,6 +218,7 @@ def _prior_blocks(problem: _Problem, spread: Array) -> tuple[Array, Array]:
     """Return the prior's information: diagonal blocks (T, 2n, 2n), blocks (k, k+1) (T-1, 2n, 2n)."""
     n, frames = problem.chain.unknowns, len(problem.time_s)
     step = np.diff(problem.time_s)[:, None]
+    # inverse of spread [[dt^3/3, dt^2/2], [dt^2/2, dt]], the covariance of an integrated Wiener process
     qq, qr, rr = 12 / step**3 / spread, -6 / step**2 / spread, 4 / step / spread
     diagonal, coupling = np.zeros((frames, 2 * n, 2 * n)), np.zeros((frames - 1, 2 * n, 2 * n))
     i, j = np.arange(n), np.arange(n) + n

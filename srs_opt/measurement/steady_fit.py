@@ -105,6 +105,7 @@ def fit_steady(time_s: Array, tracks: Complex, period_s: float, harmonics: int |
     rate = float(found.x)
     drift = _drift(parts, rate)
     shapes = np.array([part.coefficients(rate, drift) for part in parts])
+    # turn rate, drift (2), and a complex amplitude per harmonic and marker
     count = 2 * sum(len(part.t) for part in parts)
     freedom = count - 3 - 2 * shapes.size
     return SteadyFit(

@@ -190,6 +190,7 @@ def time_constants(s: float, q: float, covariance: Array) -> tuple[TimeConstant,
     nodes = ndtri((np.arange(STEP_TEST.grid) + 0.5) / STEP_TEST.grid)
     root = np.linalg.cholesky(covariance + np.diag([1e-18, 1e-18]))
     u, v = np.meshgrid(nodes, nodes, indexing="ij")
+    # of s on q: where q is moved to 0, s moves along with it
     regression = covariance[0, 1] / covariance[1, 1] if covariance[1, 1] > 0 else 0.0
     squares = q + root[1, 0] * u + root[1, 1] * v
     means = s + root[0, 0] * u - regression * np.minimum(squares, 0.0)
