@@ -1,7 +1,7 @@
 """Trials that begin in mid-gait: where the robot was and the clock's offset are fitted to the track.
 
-The robot runs in, so that the start is forgotten; pose and offset are eliminated from the normal equations
-(variable projection), so that the fit's own coordinates do not know of them.
+The robot runs in, so that the start no longer matters; pose and offset are eliminated from the normal
+equations (variable projection), so that the fit's own coordinates do not know of them.
 """
 
 from __future__ import annotations

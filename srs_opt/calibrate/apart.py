@@ -42,7 +42,7 @@ def outlying_trials(
 ) -> tuple[dict[str, str], Fit]:
     """Return the few trials, if any, that contradict all others, and the fit to these.
 
-    Each stands with what speaks against it.
+    With each stands what it contradicts.
 
     Parameters
     ----------

@@ -55,10 +55,10 @@ def cleaned(dataset: DataSet) -> CleanedTracks:
             swapped[trial.name] = count
         points = track.reshape(len(track), -1, 2) if trial.markers_m is None else trial.markers_m
         seen += int(np.isfinite(points[..., 0]).sum())
-        wild = outliers_of(points, trial.time_s)
-        if wild.any():
-            outliers[trial.name] = int(wild.sum())
-            points = np.where(wild[..., None], np.nan, points)
+        outlying = outliers_of(points, trial.time_s)
+        if outlying.any():
+            outliers[trial.name] = int(outlying.sum())
+            points = np.where(outlying[..., None], np.nan, points)
             trial = _with_points(trial, points)
         trials.append(trial)
     return CleanedTracks(replace(dataset, trials=tuple(trials)), outliers, swapped, seen)
@@ -87,9 +87,9 @@ def outliers_of(points: Array, time_s: Array) -> np.ndarray:
     The farthest of its neighbourhood is left out first, then the parabolas are drawn anew.
     """
     frames, markers = points.shape[:2]
-    wild = np.zeros((frames, markers), dtype=bool)
+    outlying = np.zeros((frames, markers), dtype=bool)
     if frames < 4 * CLEANING.least_frames:
-        return wild
+        return outlying
     frame_s = float(np.median(np.diff(time_s)))
     reach = CLEANING.least_frames
     if frame_s > 0:
@@ -97,21 +97,21 @@ def outliers_of(points: Array, time_s: Array) -> np.ndarray:
     off, sure = _off_parabola(points, reach)
     size = np.where(sure, np.max(np.abs(off), axis=2), 0.0)
     if not sure.any():
-        return wild
+        return outlying
     # where a quiet camera sees a quick motion, its parabolas are off by more than the noise
     usual = np.median(np.abs(off[sure])) / MAD
     limit = CLEANING.outlier_sd * np.maximum(usual, _usual_nearby(size, CLEANING.neighbourhood * reach))
     some = np.arange(markers)
     for _ in range(CLEANING.passes):
         found = (size >= _largest_nearby(size, reach)) & (size > limit[:, some])
-        wild[:, some] |= found
+        outlying[:, some] |= found
         again = found.any(axis=0)
         some = some[again]
         if not some.size:
             break
-        off, sure = _off_parabola(np.where(wild[:, some, None], np.nan, points[:, some]), reach)
+        off, sure = _off_parabola(np.where(outlying[:, some, None], np.nan, points[:, some]), reach)
         size = np.where(sure, np.max(np.abs(off), axis=2), 0.0)
-    return wild
+    return outlying
 
 
 def _usual_nearby(size: Array, reach: int) -> Array:

@@ -105,7 +105,7 @@ class Experiment:
 
         With `stale` the derivatives may be those of the last request for the same coordinates, which costs a
         fifth; the residuals are always those at `point`. With `rough` motions are good enough for a model
-        that leaves a plain misfit.
+        that leaves a large misfit.
 
         Raises
         ------

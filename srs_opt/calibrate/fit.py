@@ -48,7 +48,7 @@ class Measured(Protocol):
     ) -> dict[str, NormalEquations]:
         """Return the normal equations at `point`, by trial.
 
-        `stale` allows derivatives of an earlier point, `rough` motions good enough for a plain misfit.
+        `stale` allows derivatives of an earlier point, `rough` motions good enough for a large misfit.
         """
 
 
@@ -182,7 +182,7 @@ class _Descent:
         self.nonlinear = False  # whether the last step gained something else than the derivatives promised
 
     def begin(self, point: Point) -> None:
-        """Linearise where the fit starts, roughly where the misfit is plain."""
+        """Linearise where the fit starts, roughly where the misfit is large."""
         self.point = point
         # the scatter's derivatives alone tell, for a third of the time
         few = [c for c in self.coordinates if c.name in SCATTER_SD] or self.coordinates
@@ -315,8 +315,8 @@ class _Descent:
     ) -> Point:
         """Return the new point with the scatter of diverging trials taken back; their matrices follow.
 
-        A trial's scatter is its own affair: one near a change of its gait, which follows far less linearly
-        than the others, must not hold up the fit to all.
+        A trial near a change of its gait follows far less linearly than the others; its own scatter, which no
+        other trial depends on, must not make the fit to all reject the step.
         """
         (point, equations), (moved, new_equations) = before, after
         step = np.array([moved.values[c.name] - point.values[c.name] for c in self.coordinates])

@@ -71,7 +71,7 @@ class Request:
         Whether derivatives of the last request for the same coordinates serve, wherever that was. Those of
         the same place always do.
     rough : bool
-        Whether the motions need not be better than a model can say that leaves a plain misfit.
+        Whether the motions need be no more accurate than a model needs that leaves a large misfit.
     noise : Noise, optional
         Default: the trials' own.
     """

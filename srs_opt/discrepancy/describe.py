@@ -106,8 +106,8 @@ def confirmation(
     found = next_experiment(description.experiment, (best, other), trials)
     if found is None:
         return None
-    stories = description.sentence, _sentence(other) if other.candidates else NOTHING
-    return replace(found, what=f"{found.what}; and {description.term.effect.look}", separates=stories)
+    both = description.sentence, _sentence(other) if other.candidates else NOTHING
+    return replace(found, what=f"{found.what}; and {description.term.effect.look}", separates=both)
 
 
 def terms_of(links: int, present: Sequence[str] = ()) -> tuple[Candidate, ...]:

@@ -29,7 +29,7 @@ class NextExperiment:
     ----------
     what : str
     separates : tuple of str
-        The stories that it tells apart.
+        The explanations that it tells apart.
     expected_power : float
         Probability that it decides between them, if one of them is right.
     """
@@ -40,9 +40,9 @@ class NextExperiment:
 
 
 def rivals_of(selection: Selection, fitted: Sequence[Hypothesis], null: Hypothesis) -> tuple[Hypothesis, ...]:
-    """Return what an experiment should tell apart: the rivals, or without any the two best stories.
+    """Return what an experiment should tell apart: the rivals, or without any the two best explanations.
 
-    The stories are the best fits that put the fault into different stages of the model, so that the answer
+    These are the best fits that put the fault into different stages of the model, so that the answer
     says where to look; where there is one only, that nothing is missing is the other.
     """
     from srs_opt.effects import known_effects

@@ -301,7 +301,7 @@ class Search:
         others = [s for s in proposals if s not in bending][: 2 * most - len(bending)]
         before = len(others) if have else SEARCH.refits_before_bending
         for score in (*others[:before], *bending, *others[before:]):
-            if have and score in bending and self._gets_on(found, current):
+            if have and score in bending and self._makes_progress(found, current):
                 continue
             if explains is not None and not could_replace(self.examine(explains), score.candidate):
                 continue
@@ -326,7 +326,7 @@ class Search:
         near = [h for h in found if cost(h) < cost(found[0]) + 2 * SEARCH.rival_deviance]
         return self._best_of_whole(near)
 
-    def _gets_on(self, found: Sequence[Hypothesis], current: Diagnostics) -> bool:
+    def _makes_progress(self, found: Sequence[Hypothesis], current: Diagnostics) -> bool:
         """Whether one of some refits leaves less of the misfit than counts as progress."""
         without = self._fits.get(fit_key(current.hypothesis.candidates, self.quick != self.trials))
         return without is not None and any(left_of(without, h) < SEARCH.progress_share for h in found)

@@ -107,7 +107,7 @@ class ScreenSettings:
     screened_s : float
         Of all trials together, up to which candidates are screened on every one: half the time for sets of a
         dozen trials would lose small effects, and beyond it five trials of 8 s show a third of a typical size
-        as plainly.
+        as clearly.
     start_reach : float
         Typical sizes to which the size is limited that a linearisation expects: farther off it is
         extrapolated.

@@ -45,13 +45,13 @@ def correct_labels(chain: Chain, markers_m: Array) -> CorrectedLabels:
         Tail to head, NaN where lost. The first frame that shows most markers must be in order.
     """
     points = np.asarray(markers_m, dtype=float)
-    calm = np.zeros(len(points), dtype=bool), np.zeros(points.shape[:2], dtype=bool)
+    unchanged = np.zeros(len(points), dtype=bool), np.zeros(points.shape[:2], dtype=bool)
     if not _suspicious(chain, points):
-        return CorrectedLabels(points, *calm)
+        return CorrectedLabels(points, *unchanged)
     counts = np.isfinite(points[..., 0]).sum(axis=1)
     start = next((k for k in np.flatnonzero(counts == counts.max()) if fits_chain(chain, points[k])), None)
     if start is None:
-        return CorrectedLabels(points, *calm)
+        return CorrectedLabels(points, *unchanged)
     owners = follow(chain, points, int(start), np.arange(chain.markers))
     mended = take(points, owners)
     own = np.arange(chain.markers)
@@ -161,10 +161,10 @@ def _without_strays(chain: Chain, positions: Array, owners: np.ndarray) -> np.nd
         seen, excess = _stretch(chain, links)
         if len(seen) < 3:
             break
-        blame = np.zeros(len(seen))
-        blame[:-1] += excess
-        blame[1:] += excess
-        worst = seen[int(np.argmax(blame))]
+        stretched = np.zeros(len(seen))
+        stretched[:-1] += excess
+        stretched[1:] += excess
+        worst = seen[int(np.argmax(stretched))]
         links[worst], owners[worst] = np.nan, -1
     return owners
 

@@ -109,7 +109,7 @@ class Trial:
         Where the markers sit; None: one on every link's centre.
     moving : bool
         Whether the recording begins in mid-gait: then the valves started before the first label, long enough
-        for the start to be forgotten, and where the robot was and the clock's offset are to be fitted.
+        for the start not to matter any more, and where the robot was and the clock's offset are to be fitted.
     """
 
     name: str

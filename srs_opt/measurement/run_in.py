@@ -22,7 +22,7 @@ from srs_opt.simulate.interpolate import linear
 
 
 def run_in_s(frequency_hz: float) -> float:
-    """Return the time of whole cycles after which a gait has forgotten how it began."""
+    """Return the time of whole cycles after which the motion no longer depends on how it began."""
     cycles = max(RUN_IN.least_run_in_cycles, int(np.ceil(RUN_IN.least_s * frequency_hz)))
     return cycles / frequency_hz
 

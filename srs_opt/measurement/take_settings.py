@@ -49,7 +49,7 @@ class RunInSettings:
     Attributes
     ----------
     least_s : float
-        After which a gait has forgotten how it began,
+        After which the motion no longer depends on how it began,
     least_run_in_cycles : int
         and after so many cycles.
     least_cycles : int
