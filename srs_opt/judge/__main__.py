@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -64,7 +65,8 @@ def build_parser() -> Parser:
         type=positive_float,
         default=0.02,
         metavar="SHARE",
-        help="of speed, up to which it agrees, or 2 mm/s; turn rates half as much again, or 0.02 rad/s "
+        help="of speed, up to which it agrees, or 2 mm/s (of a robot as long as the built-in one); turn "
+        "rates half as much again, or 0.02 rad/s "
         "(default 0.02)",
     )
     return parser
@@ -74,7 +76,7 @@ def run(options: argparse.Namespace) -> Answer:
     """Read, play, compare."""
     from srs_opt.errors import InputError
     from srs_opt.judge.registry import DART, JUDGES
-    from srs_opt.judge.settings import AgreementSettings
+    from srs_opt.judge.settings import AGREEMENT
     from srs_opt.robot import load_robot
 
     judge = JUDGES.named(options.engine)
@@ -84,7 +86,8 @@ def run(options: argparse.Namespace) -> Answer:
     name = Path(options.file).name
     if judge is not DART and name in ("plan.json", "motion.json", "manoeuvre.json"):
         raise InputError(f"--engine {judge.name}: a plan or a manoeuvre is played by {DART.name} only")
-    tolerance = AgreementSettings(options.tolerance, 1.5 * options.tolerance)
+    shares = {"speed_share": options.tolerance, "turn_share": 1.5 * options.tolerance}
+    tolerance = replace(AGREEMENT, **shares, body_m=robot.length_m)
     if name in ("plan.json", "motion.json"):
         return _motion(options, robot)
     if name == "manoeuvre.json":

@@ -121,5 +121,6 @@ def _has_settled(motions: Sequence[CycleMotion], length_m: float) -> bool:
         max(changes[-1] / max(changes[-2], 1e-12), changes[-2] / max(changes[-3], 1e-12)),
         SETTLING.slowest_ratio,
     )
+    least_m_s = SETTLING.least_change_body_s * length_m
     left = changes.max() * ratio / (1 - ratio)
-    return bool(left < max(SETTLING.remaining_share * math.hypot(*rates[-1]), SETTLING.least_change_m_s))
+    return bool(left < max(SETTLING.remaining_share * math.hypot(*rates[-1]), least_m_s))

@@ -100,7 +100,7 @@ def opinion_on(
     """
     check_gait(robot, gait)
     judged = JUDGES.named(engine).judge_gait(robot, gait, settings, refine)
-    return Opinion(name, ours_of(robot, gait, model), judged, tolerance)
+    return Opinion(name, ours_of(robot, gait, model), judged, tolerance.of_body(robot.length_m))
 
 
 @dataclass(frozen=True)
@@ -132,7 +132,7 @@ def opinions(
             sweep(work, list(cases), chunk=1, where=where, what="judging", quiet=quiet, resume=resume)
         )
     return [
-        Opinion(case.name, Ours(*ours), Judged(**judged), tolerance)
+        Opinion(case.name, Ours(*ours), Judged(**judged), tolerance.of_body(robot.length_m))
         for case, (ours, judged) in zip(cases, rows)
     ]
 

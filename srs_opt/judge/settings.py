@@ -5,7 +5,7 @@ Lengths are in body lengths, speeds in body lengths per second where the name sa
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from dart_snake.engine import STEP_S
 
@@ -46,8 +46,9 @@ class SettlingSettings:
         changes would else look like a motion that never settles.
     lever_body : float
         Turn rates weigh as speeds at this distance, in body lengths.
-    least_change_m_s : float
-        Change of speed that is never asked about, well below the tolerance of the comparison.
+    least_change_body_s : float
+        Change of speed, body lengths per second, that is never asked about: well below the tolerance of the
+        comparison.
     averaged_cycles : int
         That are averaged when cycles never repeat.
     """
@@ -58,7 +59,7 @@ class SettlingSettings:
     remaining_share: float = 5e-4
     slowest_ratio: float = 0.95
     lever_body: float = 0.1 / 0.236
-    least_change_m_s: float = 2e-5
+    least_change_body_s: float = 2e-5 / 0.236
     averaged_cycles: int = 12
 
 
@@ -70,27 +71,43 @@ class AgreementSettings:
     ----------
     speed_share, turn_share : float
         Contact solvers and step sizes leave a few parts in a thousand, another friction law 40 %.
-    speed_m_s, turn_rate_rad_s : float
-        For slow and for straight gaits, which have no speed or turn rate to take a share of; the second is
-        the first at 0.1 m from the middle of the body.
+    speed_body_s, turn_rate_rad_s : float
+        For slow and for straight gaits, which have no speed or turn rate to take a share of: 2 mm/s of the
+        built-in robot, and that at 0.42 lengths (0.1 m) from the middle of the body.
     drift_share : float
         Distance between the motions, played open loop, over the distance travelled: small differences of
         speed and turn rate add up.
     least_drift_body : float
         The same near the start, in body lengths: 10 mm of the built-in robot.
+    body_m : float
+        The body's length.
     """
 
     speed_share: float = 0.02
     turn_share: float = 0.03
-    speed_m_s: float = 0.002
+    speed_body_s: float = 0.002 / 0.236
     turn_rate_rad_s: float = 0.02
     drift_share: float = 0.03
     least_drift_body: float = 0.01 / 0.236
+    body_m: float = 0.236
+
+    def of_body(self, length_m: float) -> AgreementSettings:
+        """Return the rule for a robot of that length."""
+        return replace(self, body_m=length_m)
+
+    @property
+    def speed_m_s(self) -> float:
+        """Difference of speeds that always agrees, m/s."""
+        return self.speed_body_s * self.body_m
 
     def to_record(self) -> dict[str, float]:
         """Return what a gait is compared by, as judge.json holds it."""
-        keys = ("speed_share", "turn_share", "speed_m_s", "turn_rate_rad_s")
-        return {key: getattr(self, key) for key in keys}
+        return {
+            "speed_share": self.speed_share,
+            "turn_share": self.turn_share,
+            "speed_m_s": round(self.speed_m_s, 9),
+            "turn_rate_rad_s": self.turn_rate_rad_s,
+        }
 
 
 @dataclass(frozen=True)

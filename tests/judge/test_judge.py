@@ -14,7 +14,7 @@ from srs_opt.judge.__main__ import main
 from srs_opt.judge.bodies import check_engine
 from srs_opt.judge.gaits import judge_gait
 from srs_opt.judge.opinion import opinion_on
-from srs_opt.judge.settings import EngineSettings
+from srs_opt.judge.settings import AGREEMENT, EngineSettings
 from srs_opt.robot import Robot, wpi_srs
 from srs_opt.simulate.timeline import Timeline
 from srs_opt.simulate.valve_file import write_valves
@@ -139,6 +139,13 @@ def test_a_table_through_the_command(tmp_path, capsys):
     assert left["judge"]["turn_rate_rad_s"] > 0 > right["judge"]["turn_rate_rad_s"]
     assert sum(g["judge"]["error"] is not None for g in answer["gaits"]) == 1
     assert json.loads((tmp_path / "judge.json").read_text()) == answer
+
+
+def test_a_longer_robot_is_judged_by_its_own_lengths():
+    longer = AGREEMENT.of_body(2 * ROBOT.length_m)
+    assert AGREEMENT.speed_m_s == pytest.approx(0.002)
+    assert longer.speed_m_s == pytest.approx(2 * AGREEMENT.speed_m_s)
+    assert longer.turn_rate_rad_s == AGREEMENT.turn_rate_rad_s
 
 
 def test_without_the_engine_it_is_one_line(monkeypatch):
