@@ -15,11 +15,12 @@ from srs_opt.measurement.records import Applied, Schedule, Trial
 from srs_opt.model.parameters import Structure
 from srs_opt.model.registry import state_layout
 from srs_opt.model.state import BODY, POSE, StateLayout
-from srs_opt.simulate.adaptive import MeshSettings, NonFiniteMotionError, adapted
+from srs_opt.simulate.adaptive import NonFiniteMotionError, adapted
 from srs_opt.simulate.batched import Search, StepRequest, run_one
 from srs_opt.simulate.integrate import step_kernel
 from srs_opt.simulate.kernel import Kernel
 from srs_opt.simulate.mesh import Mesh
+from srs_opt.simulate.settings import MeshSettings
 from srs_opt.simulate.timeline import Timeline
 
 

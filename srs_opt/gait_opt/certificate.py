@@ -12,7 +12,7 @@ from srs_opt.gait import Gait
 from srs_opt.gait_opt.collocation.problem import CycleProblem
 from srs_opt.gait_opt.goal import Goal, Limits
 from srs_opt.gait_opt.score import broken_constraints, evaluated, robot_scores
-from srs_opt.gait_opt.settings import GOAL
+from srs_opt.gait_opt.settings import CERTIFICATE, GOAL, CertificateSettings
 from srs_opt.geometry import distance_along
 from srs_opt.model.state import FORWARD, SIDEWAYS, YAW_MOMENTUM
 from srs_opt.orbit.attractors import other_orbits
@@ -23,41 +23,6 @@ from srs_opt.simulate.integrate import Integrator
 from srs_opt.simulate.rosenbrock import VELOCITY
 from srs_opt.simulate.run import motion_of_cycle
 from srs_opt.simulate.timeline import Timeline
-
-
-@dataclass(frozen=True)
-class CertificateSettings:
-    """When a gait counts as certified.
-
-    Attributes
-    ----------
-    cycles : int
-        Simulated for the periodicity gap and for the start from rest. Fewer would refuse gaits that
-        accelerate slowly; more only take time.
-    speed_error : float
-        Of the simulated speed: up to which the optimizer's may differ. Smaller, gaits are refused for the
-        error of their mesh; larger, collocated orbits pass that are not the simulated one.
-    speed_floor : float
-        Of that difference, for gaits that hardly move: body lengths per second.
-    gap : float
-        Change of velocity and shape over `cycles`, over their size. What integration leaves is smaller.
-    standing_start : float
-        Of the steady speed: up to which the last of `cycles` cycles from rest may differ.
-    limit_excess, constraint_excess : float
-        Of a limit (band, curvature), and of an objective's own constraint: by which it may be exceeded after
-        switches are rounded to ticks, which moves them by half a tick.
-    """
-
-    cycles: int = 50
-    speed_error: float = 0.005
-    speed_floor: float = 0.00212
-    gap: float = 1e-3
-    standing_start: float = 0.01
-    limit_excess: float = 0.01
-    constraint_excess: float = 0.01
-
-
-DEFAULT_CERTIFICATE = CertificateSettings()
 
 
 @dataclass(frozen=True)
@@ -189,7 +154,7 @@ def certify(
     problem: CycleProblem,
     gait: Gait,
     claimed_m_s: tuple[float, ...],
-    settings: CertificateSettings = DEFAULT_CERTIFICATE,
+    settings: CertificateSettings = CERTIFICATE,
 ) -> tuple[Certificate, tuple[Orbit, ...]]:
     """Return the certificate of a gait that stands on the controller's ticks, and its orbits per robot.
 
@@ -251,7 +216,7 @@ def _certified(
 
 def standing_start(robot: Robot, gait: Gait, model: str, cycles: int | None = None) -> float:
     """Return the mean speed (m/s) over the last of `cycles` cycles from rest (None: the certificate's)."""
-    cycles = DEFAULT_CERTIFICATE.cycles if cycles is None else cycles
+    cycles = CERTIFICATE.cycles if cycles is None else cycles
     run = _undelayed(robot, model)
     path = run.integrate(Timeline.of_gait(gait, cycles * gait.period_s), run.rest())
     return motion_of_cycle(run, path, gait, cycles - 1).speed_m_s
@@ -265,7 +230,7 @@ def _undelayed(robot: Robot, model: str) -> Integrator:
 
 def periodicity_gap(robot: Robot, gait: Gait, model: str, orbit: Orbit, cycles: int | None = None) -> float:
     """Return by how much velocity and shape change over simulated cycles, relative to their size."""
-    cycles = DEFAULT_CERTIFICATE.cycles if cycles is None else cycles
+    cycles = CERTIFICATE.cycles if cycles is None else cycles
     start = orbit.solution.start
     run = _undelayed(robot, model)
     x = run.integrate(Timeline.of_gait(gait, cycles * gait.period_s), start).final

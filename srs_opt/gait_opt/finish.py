@@ -8,13 +8,14 @@ import numpy as np
 
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait
-from srs_opt.gait_opt.certificate import DEFAULT_CERTIFICATE, Certificate, certify
+from srs_opt.gait_opt.certificate import Certificate, certify
 from srs_opt.gait_opt.collocation.problem import CycleProblem
 from srs_opt.gait_opt.continuation import Report, orbits_of
 from srs_opt.gait_opt.corrections import on_ticks, steered, symmetrized
 from srs_opt.gait_opt.prices import of_ticks
 from srs_opt.gait_opt.score import Score, score
 from srs_opt.gait_opt.search_settings import ROUNDING
+from srs_opt.gait_opt.settings import CERTIFICATE
 from srs_opt.gait_opt.starts import turn_miss
 from srs_opt.gait_opt.switch_times import ExactSwitchTimes, collocated_speeds, optimize_switch_times
 from srs_opt.gait_opt.tick_search import searched_on_ticks
@@ -78,7 +79,7 @@ def _claimed(problem: CycleProblem, exact: ExactSwitchTimes, played: Gait) -> tu
     solve improved on the gait that it began with, that collocation has to be asked about this one.
     """
     simulated = [o.speed_m_s for o in orbits_of(problem, played)]
-    allowed = DEFAULT_CERTIFICATE.speed_error
+    allowed = CERTIFICATE.speed_error
     near = (abs(c - s) <= allowed * abs(s) for c, s in zip(exact.claimed_m_s, simulated))
     return exact.claimed_m_s if all(near) else collocated_speeds(problem, played) or exact.claimed_m_s
 
@@ -89,11 +90,11 @@ def _less_asked(problem: CycleProblem, asked: CycleProblem, orbits: tuple[Orbit,
     goal, limits = asked.goal, asked.limits
     if band is not None and goal.envelope_m is not None:
         excess = max(sum(o.envelope_m) for o in orbits) - band
-        if excess > DEFAULT_CERTIFICATE.limit_excess * band:
+        if excess > CERTIFICATE.limit_excess * band:
             goal = replace(goal, envelope_m=goal.envelope_m - excess)
     if most is not None and limits.max_curvature_1_m is not None:
         excess = max(float(np.abs(o.kappa).max()) for o in orbits) - most
-        if excess > DEFAULT_CERTIFICATE.limit_excess * most:
+        if excess > CERTIFICATE.limit_excess * most:
             limits = replace(limits, max_curvature_1_m=limits.max_curvature_1_m - excess)
     return None if (goal, limits) == (asked.goal, asked.limits) else replace(asked, goal=goal, limits=limits)
 

@@ -230,6 +230,38 @@ class ReportSettings:
     least_gain_percent: float = 0.5
 
 
+@dataclass(frozen=True)
+class CertificateSettings:
+    """When a gait counts as certified.
+
+    Attributes
+    ----------
+    cycles : int
+        Simulated for the periodicity gap and for the start from rest. Fewer would refuse gaits that
+        accelerate slowly; more only take time.
+    speed_error : float
+        Of the simulated speed: up to which the optimizer's may differ. Smaller, gaits are refused for the
+        error of their mesh; larger, collocated orbits pass that are not the simulated one.
+    speed_floor : float
+        Of that difference, for gaits that hardly move: body lengths per second.
+    gap : float
+        Change of velocity and shape over `cycles`, over their size. What integration leaves is smaller.
+    standing_start : float
+        Of the steady speed: up to which the last of `cycles` cycles from rest may differ.
+    limit_excess, constraint_excess : float
+        Of a limit (band, curvature), and of an objective's own constraint: by which it may be exceeded after
+        switches are rounded to ticks, which moves them by half a tick.
+    """
+
+    cycles: int = 50
+    speed_error: float = 0.005
+    speed_floor: float = 0.00212
+    gap: float = 1e-3
+    standing_start: float = 0.01
+    limit_excess: float = 0.01
+    constraint_excess: float = 0.01
+
+
 GOAL = GoalSettings()
 FEASIBILITY = FeasibilitySettings()
 SCORE = ScoreSettings()
@@ -238,3 +270,4 @@ DUTY_BIAS = DutyBiasSettings()
 START = StartSettings()
 STIFFNESS = StiffnessSettings()
 REPORT = ReportSettings()
+CERTIFICATE = CertificateSettings()

@@ -13,7 +13,8 @@ from srs_opt.manoeuvre.shooting import Shot
 from srs_opt.manoeuvre.task import Task
 from srs_opt.manoeuvre.valves import ValvePlan
 from srs_opt.model.state import POSE, VELOCITY
-from srs_opt.simulate.integrate import INTEGRATION, Integrator, Trajectory
+from srs_opt.simulate.integrate import Integrator, Trajectory
+from srs_opt.simulate.settings import INTEGRATION
 
 
 @dataclass(frozen=True)

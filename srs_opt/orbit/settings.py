@@ -70,7 +70,68 @@ class ChainSettings:
     length: int = 12
 
 
+@dataclass(frozen=True)
+class OrbitSettings:
+    """How a periodic orbit is searched. Speeds in m/s measure all dynamic states, scaled to compare.
+
+    Attributes
+    ----------
+    newton_steps : int
+        At most, on one mesh; six are usual.
+    closed_m_s : float
+        By how much the states of a closed orbit change per cycle: rounding leaves 1e-12.
+    rough_m_s : float
+        The same on the even first mesh: only there is the mesh worth adapting, because friction's sharp
+        features move with the motion. Smaller: Newton steps that the next mesh repeats; larger: a mesh
+        adapted to another motion.
+    meshes : int
+        Adapted at most.
+    first_step_s : float
+        Of the even first mesh.
+    warm_up_periods : int
+        Simulated from rest before the first Newton step.
+    settle_periods : int
+        Simulated where Newton's step does not lead nearer.
+    settling_periods : int
+        Simulated, on adapted meshes, where Newton fails from the warm-up's end.
+    free_attempts, attempts : int
+        Of a mesh for the motion from rest, in place of those of `MeshSettings`: this motion decides which
+        orbit is found, so that its mesh may get coarser once more than others.
+    bend_time_s : float
+        Turns a bend into a rate: about 1/omega of a soft body's slowest mode.
+    nearly_m_s, quiet_periods : float, int
+        From rest: Newton starts where so many cycles in a row change by less than this. Larger: Newton may
+        find another orbit than the one that is reached.
+    nearness, farthest_m_s : float
+        And its orbit counts within so many times what the last change says is left to go, and within this.
+    same_m_s : float
+        Allowed besides: Newton's mesh is finer than that on which the motion settled, which moves the
+        orbit.
+    most_periods : int
+        From rest, before the motion counts as one that does not repeat.
+    """
+
+    newton_steps: int = 30
+    closed_m_s: float = 1e-9
+    rough_m_s: float = 1e-3
+    meshes: int = 4
+    first_step_s: float = 0.004
+    warm_up_periods: int = 2
+    settle_periods: int = 5
+    settling_periods: int = 10
+    free_attempts: int = 4
+    attempts: int = 12
+    bend_time_s: float = 0.05
+    nearly_m_s: float = 2e-3
+    quiet_periods: int = 3
+    nearness: float = 3.0
+    farthest_m_s: float = 0.15
+    same_m_s: float = 2e-3
+    most_periods: int = 200
+
+
 ATTRACTOR = AttractorSettings()
 ENVELOPE = EnvelopeSettings()
 DIFFERENCE = DifferenceSettings()
 CHAIN = ChainSettings()
+ORBIT = OrbitSettings()

@@ -24,70 +24,13 @@ from srs_opt.model.registry import build
 from srs_opt.model.state import POSE, WORK
 from srs_opt.orbit.actuators import periodic_actuators
 from srs_opt.orbit.period_map import PeriodMap, period_map, plain_period_map
-from srs_opt.simulate.adaptive import MESH, NonFiniteMotionError, adapted
+from srs_opt.orbit.settings import ORBIT
+from srs_opt.simulate.adaptive import NonFiniteMotionError, adapted
 from srs_opt.simulate.batched import Search, StepRequest
-from srs_opt.simulate.integrate import INTEGRATION, Integrator
+from srs_opt.simulate.integrate import Integrator
 from srs_opt.simulate.mesh import Mesh
+from srs_opt.simulate.settings import INTEGRATION, MESH
 from srs_opt.simulate.tableau import LEVER_M
-
-
-@dataclass(frozen=True)
-class OrbitSettings:
-    """How a periodic orbit is searched. Speeds in m/s measure all dynamic states, scaled to compare.
-
-    Attributes
-    ----------
-    newton_steps : int
-        At most, on one mesh; six are usual.
-    closed_m_s : float
-        By how much the states of a closed orbit change per cycle: rounding leaves 1e-12.
-    rough_m_s : float
-        The same on the even first mesh: only there is the mesh worth adapting, because friction's sharp
-        features move with the motion. Smaller: Newton steps that the next mesh repeats; larger: a mesh
-        adapted to another motion.
-    meshes : int
-        Adapted at most.
-    first_step_s : float
-        Of the even first mesh.
-    warm_up_periods : int
-        Simulated from rest before the first Newton step.
-    settle_periods : int
-        Simulated where Newton's step does not lead nearer.
-    settling_periods : int
-        Simulated, on adapted meshes, where Newton fails from the warm-up's end.
-    bend_time_s : float
-        Turns a bend into a rate: about 1/omega of a soft body's slowest mode.
-    nearly_m_s, quiet_periods : float, int
-        From rest: Newton starts where so many cycles in a row change by less than this. Larger: Newton may
-        find another orbit than the one that is reached.
-    nearness, farthest_m_s : float
-        And its orbit counts within so many times what the last change says is left to go, and within this.
-    same_m_s : float
-        Allowed besides: Newton's mesh is finer than that on which the motion settled, which moves the orbit.
-    most_periods : int
-        From rest, before the motion counts as one that does not repeat.
-    """
-
-    newton_steps: int = 30
-    closed_m_s: float = 1e-9
-    rough_m_s: float = 1e-3
-    meshes: int = 4
-    first_step_s: float = 0.004
-    warm_up_periods: int = 2
-    settle_periods: int = 5
-    settling_periods: int = 10
-    bend_time_s: float = 0.05
-    nearly_m_s: float = 2e-3
-    quiet_periods: int = 3
-    nearness: float = 3.0
-    farthest_m_s: float = 0.15
-    same_m_s: float = 2e-3
-    most_periods: int = 200
-
-
-ORBIT = OrbitSettings()
-# The motion from rest decides which orbit is found, so that its mesh may get coarser once more than others.
-ORBIT_MESH = replace(MESH, free_attempts=4, attempts=12)
 
 
 @dataclass(frozen=True)
@@ -215,8 +158,9 @@ def _accurate_period_map(
 ) -> Search[tuple[np.ndarray, Mesh]]:
     """Return the state one period after state `x`, and a mesh that is fine enough for that motion."""
     request = StepRequest(cycle.run.kernel, x, mesh, cycle.valve, cycle.p)
+    settings = replace(MESH, free_attempts=ORBIT.free_attempts, attempts=ORBIT.attempts)
     try:
-        got = yield from adapted(request, tolerance, ORBIT_MESH)
+        got = yield from adapted(request, tolerance, settings)
     except NonFiniteMotionError:
         raise cycle.no_answer(
             "the motion becomes non-finite; check pressure, masses, time constants and effect sizes"

@@ -14,38 +14,7 @@ import numpy as np
 from srs_opt.errors import NoAnswerError
 from srs_opt.simulate.batched import Search, StepRequest
 from srs_opt.simulate.mesh import Mesh
-
-
-@dataclass(frozen=True)
-class MeshSettings:
-    """When a mesh is fine enough, and how long that is tried.
-
-    Attributes
-    ----------
-    accepted : float
-        A mesh serves while no step errs by more than this many tolerances: friction forgets an error of speed
-        within milliseconds, so that single steps may be worse. Half: twice the attempts where friction
-        switches; double: errors of the track double with it.
-    free_attempts : int
-        Attempts in which the new mesh may be coarser in places. A stretch at rest looks easy until its steps
-        are longer than what happens at its end; after these attempts a mesh only gets finer.
-    attempts : int
-        Integrations at most; the last is taken as it is. With four, trials were left a millimetre off where
-        friction is sharpest.
-    halvings : int
-        Of a mesh whose steps are so long that the motion leaves what numbers can hold.
-    wasteful : float
-        A mesh of which this share of the steps would do is made anew although it serves. 0: never.
-    """
-
-    accepted: float = 8.0
-    free_attempts: int = 3
-    attempts: int = 13
-    halvings: int = 5
-    wasteful: float = 0.0
-
-
-MESH = MeshSettings()
+from srs_opt.simulate.settings import MESH, MeshSettings
 
 
 class NonFiniteMotionError(NoAnswerError):

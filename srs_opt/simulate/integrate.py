@@ -17,33 +17,8 @@ from srs_opt.simulate.batched import Search, StepRequest, run_one
 from srs_opt.simulate.kernel import Kernel
 from srs_opt.simulate.mesh import Mesh
 from srs_opt.simulate.rosenbrock import step_function
+from srs_opt.simulate.settings import INTEGRATION
 from srs_opt.simulate.timeline import Timeline
-
-
-@dataclass(frozen=True)
-class IntegrationSettings:
-    """How finely a timeline is integrated.
-
-    Attributes
-    ----------
-    tolerance_m_s : float
-        Local error of the body's speed per step: about 1e-4 of the distance travelled. An error of 1/16 takes
-        twice as many steps.
-    first_step_s : float
-        First guess of the steps; only what the first attempt costs depends on it.
-    most_alike : int
-        Alike pieces integrated in one call. More: more is integrated in vain where the mesh stops serving.
-    longest_phases : int
-        Phases of one piece at most, where a gait switches its valves so often: a mesh is adapted as a whole.
-    """
-
-    tolerance_m_s: float = 3e-5
-    first_step_s: float = 0.005
-    most_alike: int = 32
-    longest_phases: int = 400
-
-
-INTEGRATION = IntegrationSettings()
 
 
 @lru_cache(maxsize=32)

@@ -15,8 +15,8 @@ from srs_opt.result import Result
 from srs_opt.robot import Robot
 from srs_opt.simulate import compiled
 from srs_opt.simulate.cycle_motion import CycleMotion, cycle_motion
-from srs_opt.simulate.integrate import INTEGRATION, Integrator, Trajectory
-from srs_opt.simulate.settings import MOTION
+from srs_opt.simulate.integrate import Integrator, Trajectory
+from srs_opt.simulate.settings import INTEGRATION, MOTION
 from srs_opt.simulate.shapes import centre_lines
 from srs_opt.simulate.timeline import Timeline
 

@@ -7,9 +7,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from srs_opt.simulate.adaptive import Adapted, MeshSettings, NonFiniteMotionError, adapted
+from srs_opt.simulate.adaptive import Adapted, NonFiniteMotionError, adapted
 from srs_opt.simulate.batched import StepRequest, StepResult
 from srs_opt.simulate.mesh import Mesh
+from srs_opt.simulate.settings import MeshSettings
 
 TOLERANCE = 1e-5
 
