@@ -62,6 +62,7 @@ class Actuator:
         Effects that depend on time or have a state of their own ask for the `state`.
         """
         p, none = self.parameters, ca.SX.zeros(self.segments, 1)
+        # C_0 of (14), proportional to the pressure
         amplitude = p["curvature_per_pressure_1_m_kpa"] * p["pressure_kpa"]
         bias = none
         memories = iter(state.memory if state else ())
@@ -69,6 +70,7 @@ class Actuator:
             memory = next(memories, none) if effect.remembers else none
             if effect.command is not None:
                 kappa, time = (state.kappa, state.time_s) if state else (none, ca.SX(0))
+                # commands act one after the other, in the effects' canonical order
                 valve = effect.command(e, Actuation(valve, kappa, p["pressure_kpa"], time, memory))
             if effect.gain is not None:
                 amplitude = amplitude * effect.gain(e, p["frequency_hz"])
@@ -85,6 +87,7 @@ class Actuator:
         for effect, e in p.effects:
             memory = ca.SX.zeros(self.segments, 1)
             if effect.remembers:
+                # memories stand in the order of the effects that remember
                 memory = state.memory[len(memory_rates)]
             acting = Actuation(valve, state.kappa, p["pressure_kpa"], state.time_s, memory)
             if effect.remembers:
@@ -95,6 +98,7 @@ class Actuator:
                 slow = slow * effect.slow_down(e, valve, state.kappa)
             if effect.slowness is not None:
                 slow = slow * effect.slowness(e, acting)
+        # both stretch alike, so that the shape of the response (14) stays
         tau1, tau2 = p["tau1_s"] * slow, p["tau2_s"] * slow
         ddkappa = acceleration(self.target(valve, state), restoring, state.dkappa, tau1, tau2)
         clock = None if state.clock is None else ca.SX(1)
@@ -104,6 +108,7 @@ class Actuator:
         """Return the curvatures' third time derivatives while the valves are held, (N-1, 1)."""
         free = self.unstack(ca.SX.sym("state", self.states))
         rates = self.rates(free, valve)
+        # chain rule along the motion: d kappa''/dt = (d kappa''/dx) x', the valve constant
         third = ca.jtimes(rates.dkappa, free.vector(), rates.vector())
         return ca.substitute(third, free.vector(), state.vector())
 

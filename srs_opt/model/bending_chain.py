@@ -80,12 +80,14 @@ class BendingChain:
             m.place, m.velocity, m.cos, m.sin, drive.where_and_when, self.chambers(drive).kappa(y)
         )
         net_x, net_y = h * f.x - model.mass * m.acceleration[0], h * f.y - model.mass * m.acceleration[1]
+        # what a joint carries is all that acts on the links in front of it, inertia included
         joint = self.joint_forces(net_x, net_y)
         q = self._moment(y, dy, drive) * h
         g = [-model.inertia[i] * ddy[2 + i] for i in range(n)]
         for k, segment in enumerate(m.segments):
             length, length_by_turn = segment.chord[:2]
             along, across = segment.own(*joint[k + 1])
+            # d(chord)/d(theta behind, ahead) = (-c', c') along it and (c/2, c/2) across it
             stretch, turn = length_by_turn * along, length / 2 * across
             g[k] += turn - stretch - q[k]
             g[k + 1] += turn + stretch + q[k]
@@ -117,6 +119,7 @@ class BendingChain:
 
     def _share(self, chambers: Chambers) -> ca.SX:
         """Return l kappa over the segments' whole turn: gaps that bend along take part in the turn."""
+        # Q is conjugate to l kappa; by the chain rule the turn's moment is Q d(l kappa)/d(turn)
         return self.model.parameters["segment_length_m"] / chambers.turn_per_kappa
 
     def turning_stiffness(self, drive: Drive) -> tuple[ca.SX, ca.SX]:
@@ -141,6 +144,7 @@ class BendingChain:
             turn1, turn2 = (v[3 + k] - v[2 + k] for v in (dy, ddy))
             growth = chambers.of_chord(k, mixed, turn1) if mixed else NO_GROWTH
             segment = Segment((c0, c1, c2, c3), (c, s), growth)
+            # a chord turns with the mean of its headings: steps of place, velocity, and h times acceleration
             lean1, lean2 = (dy[3 + k] + dy[2 + k]) / 2, (ddy[3 + k] + ddy[2 + k]) / 2
             steps = (
                 *segment.room(c0, ca.SX(0)),
@@ -172,6 +176,7 @@ class BendingChain:
 
     def joint_forces(self, x: ca.SX, y: ca.SX) -> list[Vector]:
         """Return the sums of the links' rows from each link on to the head: entry k from link k + 1."""
+        # from the head, where nothing is in front
         joint = [(x[-1, :], y[-1, :])]
         for i in reversed(range(self.links - 1)):
             joint.append((joint[-1][0] + x[i, :], joint[-1][1] + y[i, :]))

@@ -97,6 +97,8 @@ def derivatives(chain: BendingChain, y: ca.SX, dy: ca.SX, ddy: ca.SX, drive: Dri
     power_v = _Loads.of(force.power_by_velocity)
     power_r = _Loads.of(force.power_by_place)
     return Derivatives(
+        # r' = B Y', so dr''/dY' = 2 B', dr''/dY = B'', dr'/dY = B'; forces enter g with plus, inertia with
+        # minus
         mass=assembly.matrix({MASS: (moves, 1.0)}, _inertia(chain)),
         by_rate=assembly.matrix({MASS: (moves1, -2.0), VELOCITY: (moves, 1.0)}, damper),
         by_place=assembly.matrix(
@@ -202,6 +204,7 @@ def lever(segment: Segment, turn1: ca.SX, lean1: ca.SX, turn2: ca.SX, lean2: ca.
         b_e, b_e1 = sign * c1, sign * (c2 * turn1 + grown.derivative_rate)
         b_e2 = sign * (c3 * turn1**2 + c2 * turn2 + grown.derivative_acceleration)
         # components in axes that turn with lean1
+        # (a e + b n)' = (a' - b lean') e + (b' + a lean') n, applied twice
         d_e, d_n = b_e1 - b_n * lean1, b_n1 + b_e * lean1
         dd_e = b_e2 - b_n1 * lean1 - b_n * lean2 - d_n * lean1
         dd_n = b_n2 + b_e1 * lean1 + b_e * lean2 + d_e * lean1
@@ -234,6 +237,7 @@ def _turning_levers(segments: Sequence[Segment], joint: Sequence[Pair]) -> _Loca
     diagonal = [zero] * (n + 2)
     below, above = [zero] * (n + 1), [zero] * (n + 1)
     for k, segment in enumerate(replace(s, growth=NO_GROWTH) for s in segments):
+        # a lever's derivative by a heading is its rate when that heading alone turns at 1 rad/s
         force = ca.vertcat(*joint[k + 1]).T
         by_behind, by_ahead = (lever(segment, ca.SX(turn), half, zero, zero)[1] for turn in (-1, 1))
         diagonal[2 + k] += force @ by_behind[0]

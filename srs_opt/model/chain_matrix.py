@@ -99,11 +99,14 @@ class ChainMatrix:
                 column = column + columns[-1] * self.above[i - 1]
                 pivot = pivot - below[-1] * (rows[-1] @ self.upper[i] + self.above[i - 1])
                 row = row + below[-1] * rows[-1]
+            # the pivot of row i after all eliminations: only reciprocals are kept, so that solving divides by
+            # nothing
             inverse.append(1 / (pivot - p[i] @ column))
             columns.append((self.lower[i] - column) * inverse[i])
             rows.append(g[i] - row)
             if i < n - 1:
                 below.append(self.below[i] * inverse[i])
+            # one r x s matrix carries what the eliminated rows do to all that follow
             state = state + columns[-1] @ rows[-1]
 
         def solve(right: ca.SX) -> ca.SX:

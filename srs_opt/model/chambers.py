@@ -66,6 +66,7 @@ class Chambers:
         acceleration = ca.SX.sym("acceleration", model.links - 1)
         length = model.chamber_lengths(free)
         growth = ca.jtimes(length, free, rate)
+        # the second time derivative by the chain rule once more
         second = ca.jtimes(growth, ca.vertcat(free, rate), ca.vertcat(rate, acceleration))
         found = ca.substitute(
             ca.horzcat(length, growth, second),
@@ -85,6 +86,7 @@ class Chambers:
 
     def ddkappa(self, y: ca.SX, dy: ca.SX, ddy: ca.SX) -> ca.SX:
         """Return the curvatures' accelerations."""
+        # turn = T kappa, so turn'' = T kappa'' + 2 T' kappa' + T'' kappa
         turn = ddy[3:] - ddy[2:-1] - 2 * self.growth * self.dkappa(y, dy) - self.growth_rate * self.kappa(y)
         return turn * (1 / self.turn_per_kappa)
 
@@ -111,6 +113,7 @@ def chord_function(model: CompliantModel) -> ca.Function:
     per_kappa = length + gap * ratio
     if straight and not model.stretches:
         jet, cos, sin = straight_gap_chord(kappa, length, gap)
+        # d/d(turn) = (1 / per_kappa) d/d(kappa), once per order
         jet = tuple(derivative * (1 / per_kappa) ** order for order, derivative in enumerate(jet))
     else:
         turn = ca.SX.sym("turn")
@@ -122,6 +125,7 @@ def chord_function(model: CompliantModel) -> ca.Function:
             c_l, c1_l = ca.jacobian(chord, length), ca.jacobian(first, length)
             mixed = [c_l, ca.jacobian(c_l, length), c1_l, ca.jacobian(c1_l, length)]
             mixed.append(ca.jacobian(second, length))
+        # differentiated at a fixed turn, then evaluated at the curvature
         found = ca.substitute(ca.vertcat(*jet, *mixed, cos, sin), turn, per_kappa * kappa)
         *jet, cos, sin = ca.vertsplit(found)
         jet, mixed = jet[:4], jet[4:]

@@ -19,6 +19,7 @@ class ComplexModel(Mechanics):
     def yaw_inertia(self) -> ca.SX:
         """Return sum m |rho_i|^2 + sum J."""
         c = self.chain
+        # about the centre of mass, where the body's translation carries no angular momentum
         return ca.dot(self.mass, c.x**2 + c.y**2) + ca.sum1(self.inertia)
 
     def yaw_momentum_of_shape(self) -> ca.SX:
@@ -28,4 +29,5 @@ class ComplexModel(Mechanics):
 
     def yaw_momentum_rate(self, forces: Forces, yaw_rate: ca.SX) -> ca.SX:
         """Return the moment of the external forces about the centre of mass."""
+        # joint forces act on neighbours in opposite directions and cancel in the sum
         return ca.dot(self.chain.x, forces.y) - ca.dot(self.chain.y, forces.x)

@@ -38,6 +38,7 @@ class CompliantModel(ComplexModel):
     def stiffness(self) -> ca.SX:
         """Return EI of a segment, N m^2: chamber, gap and effects in series, 1/EI + L_o/(l EI_gap) + ..."""
         p = self.parameters
+        # springs in series: flexibilities add
         flexibility = self.gap_length / (p["segment_length_m"] * p["gap_stiffness_n_m2"])
         flexibility = flexibility + 1 / p["bending_stiffness_n_m2"]
         for effect, e in p.effects:
@@ -53,6 +54,7 @@ class CompliantModel(ComplexModel):
 
     def moment(self, kappa: ca.SX, dkappa: ca.SX, no_load: ca.SX, no_load_rate: ca.SX) -> ca.SX:
         """Return the bending moments Q, N m, conjugate to l kappa, (N-1, 1)."""
+        # Q > 0 bends the segment further to the left, towards its no-load curvature
         slack = no_load - kappa + self.relaxation() * (no_load_rate - dkappa)
         return self.stiffness() * slack
 

@@ -27,6 +27,7 @@ def _link_accelerations(m: Mechanics, ddkappa: ca.SX, u: ca.SX, du: ca.SX, w: ca
         ca.jtimes(rate, m.kappa, m.dkappa) + ca.jtimes(rate, m.dkappa, ddkappa)
         for rate in (d.x, d.y, d.angle)
     )
+    # u' + w x u, then relative, Euler, Coriolis and centripetal terms of the turning frame
     x = du[0] - w * u[1] + a_x - dw * c.y - 2 * w * d.y - w**2 * c.x
     y = du[1] + w * u[0] + a_y + dw * c.x + 2 * w * d.x - w**2 * c.y
     return Chain(x, y, dw + a_angle)
@@ -50,10 +51,12 @@ def inverse_dynamics(structure: Structure) -> ca.Function:
     u, w = velocity[:2], velocity[2]
     forces = m.forces(pose, u[0], u[1], w)
     total, moment = m.total_mass(), m.yaw_momentum_rate(forces, w)
+    # N m p'' = sum f of (8), seen from the turning frame
     du = ca.vertcat(ca.sum1(forces.x) / total + w * u[1], ca.sum1(forces.y) / total - w * u[0])
     # momentum = I w + a(kappa) kappa'; its rate is the moment
     momentum = m.yaw_inertia() * w + m.yaw_momentum_of_shape()
     drift = ca.jtimes(momentum, m.kappa, m.dkappa) + ca.jtimes(momentum, m.dkappa, ddkappa)
+    # drift is the momentum's rate at constant yaw rate
     dw = (moment - drift) / m.yaw_inertia()
     a = _link_accelerations(m, ddkappa, u, du, w, dw)
     generalized = (
@@ -89,6 +92,7 @@ def forward_dynamics(structure: Structure) -> ca.Function:
     torque = ca.SX.sym("torque", kappa.shape[0])
     needed, _ = inverse(kappa, dkappa, ddkappa, pose, velocity, p)
     mass = ca.jacobian(needed, ddkappa)
+    # torque = mass kappa'' + torque at kappa'' = 0
     at_zero = ca.substitute(needed, ddkappa, ca.SX.zeros(ddkappa.shape))
     solution = ca.solve(mass, torque - at_zero)
     _, rate = inverse(kappa, dkappa, solution, pose, velocity, p)

@@ -36,6 +36,7 @@ def _polynomial(coefficients: tuple[float, ...], z: ca.SX) -> ca.SX:
 def sinc(h: ca.SX) -> ca.SX:
     """Return sin(h)/h, smooth through zero (so are its derivatives)."""
     small = ca.fabs(h) < _SERIES_RADIUS
+    # both branches are evaluated: the unused one must not divide by zero
     safe = ca.if_else(small, 1.0, h)
     return ca.if_else(small, _polynomial(_SINC, h * h), ca.sin(safe) / safe)
 
@@ -100,6 +101,7 @@ def segment_chord(
     h = segment_length * kappa / 2
     cos, sin = ca.cos(h), ca.sin(h)
     arc_chord, arc_derivative = _sinc_and_derivative(h, cos, sin)
+    # a bent half gap is an arc of L_o/2 whose half turn is bend kappa
     bend, gap_chord, gap_derivative = gap_length * gap_ratio / 4, ca.SX(1), ca.SX(0)
     if not ca.SX(gap_ratio).is_zero():
         gap_cos, gap_sin = ca.cos(bend * kappa), ca.sin(bend * kappa)
@@ -109,6 +111,7 @@ def segment_chord(
     else:
         middle_cos, middle_sin = cos, sin
     half = segment_length / 2
+    # the arc's chord lies along the mean heading, the half gaps' chords lean from it to either side
     chord = segment_length * arc_chord + gap_length * gap_chord * middle_cos
     derivative = segment_length * half * arc_derivative + gap_length * (
         bend * gap_derivative * middle_cos - (half + bend) * gap_chord * middle_sin
@@ -154,6 +157,7 @@ def straight_gap_chord(
     value, derivative = _sinc_and_derivative(h, cos, sin)
     small = ca.fabs(h) < _SERIES_RADIUS
     inverse, z = 1 / ca.if_else(small, 1.0, h), h * h
+    # h S'' = -2 S' - h S, and its derivative h S''' = -3 S'' - h S' - S
     second = ca.if_else(small, _polynomial(_SECOND, z), -value - 2 * derivative * inverse)
     third = ca.if_else(
         small, h * _polynomial(_THIRD, z), -derivative + 2 * (derivative * inverse - second) * inverse
@@ -196,6 +200,7 @@ def body_frame_chain(
     dkappa = ca.SX.zeros(kappa.shape) if dkappa is None else dkappa
     length = segment_length * ca.SX.ones(kappa.shape)
     growth = ca.SX(*kappa.shape) if length_rate is None else length_rate
+    # theta_{i+1} - theta_i: the chamber's turn and that of gaps that bend along
     turn_per_kappa = length + gap_length * gap_ratio
     angle = _headings(turn_per_kappa * kappa)
     angle_rate = _headings(turn_per_kappa * dkappa + growth * kappa)
@@ -207,6 +212,7 @@ def body_frame_chain(
         # two half turns by complex products: no further cosine along the chain
         c, s = turn_by(c_half, s_half, c, s)
         middle_rate = (angle_rate[i] + angle_rate[i + 1]) / 2
+        # the chord lengthens along itself and turns with the mean of the two headings' rates
         along, across = derivative * dkappa[i], chord * middle_rate
         if not growth[i].is_zero():
             along += growth[i] * chord_by_length(kappa[i], length[i], gap_length, gap_ratio)
@@ -218,6 +224,7 @@ def body_frame_chain(
         c, s = turn_by(c_half, s_half, c, s)
         cosines.append(c)
         sines.append(s)
+    # origin at the centre of mass: moments about it need no further terms
     weight = mass * (1 / ca.sum1(mass))
     centred = [v - ca.dot(weight, v) for v in (ca.vertcat(*p) for p in (x, y, x_rate, y_rate))]
     rates = Chain(centred[2], centred[3], angle_rate)
@@ -226,10 +233,12 @@ def body_frame_chain(
 
 def _headings(turns: ca.SX) -> ca.SX:
     """Return the links' headings, mean zero, for the turns (N-1, 1) from each link to the next."""
+    # mean zero, so that the pose's heading is the mean of the theta_i
     from_tail = ca.vertcat(0, ca.cumsum(turns))
     return from_tail - ca.sum1(from_tail) / from_tail.shape[0]
 
 
 def chord_length(kappa: ca.SX, segment_length: ca.SX) -> ca.SX:
     """Return the moment arms l_i of the paper's (3): chords of the arcs, gaps not included."""
+    # without the absolute value of (3): the sign only changes beyond a full turn of a segment
     return segment_length * sinc(segment_length * kappa / 2)

@@ -76,6 +76,7 @@ class Mechanics(ABC):
             self.mass = self.mass + effect.extra_mass(e, n) if effect.extra_mass else self.mass
         self.gap_length, self.gap_ratio = gap, ratio
         self.length = self.chamber_lengths(self.no_load)
+        # chain rule: chambers lengthen with the curvature without load
         growth = ca.jtimes(self.length, self.no_load, self.no_load_rate)
         self.shape, self.shape_rate = self.kappa, self.dkappa
         if self.stretches and parameters.structure.compliant:
@@ -126,6 +127,7 @@ class Mechanics(ABC):
 
     def yaw_rate(self, momentum: ca.SX) -> ca.SX:
         """Return the rate of the mean heading, rad/s."""
+        # L = L_shape + I omega, solved for omega
         return (momentum - self.yaw_momentum_of_shape()) * (1 / self.yaw_inertia())
 
     def total_mass(self) -> ca.SX:
@@ -142,6 +144,7 @@ class Mechanics(ABC):
     def link_velocities(self, u_x: ca.SX, u_y: ca.SX, yaw_rate: ca.SX) -> Chain:
         """Return the links' velocities in the robot's frame (m/s) and their turn rates (rad/s)."""
         c, d = self.chain, self.chain_rate
+        # v_i = u + omega x rho_i + rho_i'
         return Chain(u_x - yaw_rate * c.y + d.x, u_y + yaw_rate * c.x + d.y, yaw_rate + d.angle)
 
     def forces(self, pose: ca.SX, u_x: ca.SX, u_y: ca.SX, yaw_rate: ca.SX) -> Forces:
@@ -181,11 +184,14 @@ class Mechanics(ABC):
         if skews:
             skew = sum(skews[1:], skews[0])
             c, s = turn_by(ca.cos(skew), ca.sin(skew), cos, sin)
+        # wheel axes: t along the rolling direction, n to its left
         v_t, v_n = turn_back_by(c, s, v.x, v.y)
         along, across = FRICTION_LAWS[p.structure.friction_law](v_t, v_n, p["friction_speed_m_s"])
+        # against the sliding direction (+1 forwards or to the left), hence the minus
         f_t = -p["friction_tangential"] * normal * along
         f_n = -p["friction_normal"] * normal * across
         for effect, e in p.effects:
+            # factors scale Coulomb friction only, so they come before forces that are added
             f_t = f_t * effect.rolling_factor(e, v_t) if effect.rolling_factor else f_t
             f_n = f_n * effect.skidding_factor(e, v_n) if effect.skidding_factor else f_n
         state = LinkState(
@@ -209,6 +215,7 @@ class Mechanics(ABC):
                 on_rolling, on_skidding = effect.wheel_factors(e, state)
                 f_t, f_n = f_t * on_rolling, f_n * on_skidding
             f_t = f_t + effect.rolling_force(e, v_t) if effect.rolling_force else f_t
+        # taken before other forces are added: what a tether or a slope does is no friction
         friction_power = -(ca.dot(f_t, v_t) + ca.dot(f_n, v_n))
         x, y = c * f_t - s * f_n, s * f_t + c * f_n
         for effect, e in p.effects:
@@ -242,4 +249,5 @@ class Mechanics(ABC):
 
 def _at_links(kappa: ca.SX) -> ca.SX:
     """Return the mean curvature of the segments beside each link, (N, 1)."""
+    # the end links have one neighbour only
     return ca.vertcat(kappa[0], (kappa[1:] + kappa[:-1]) / 2, kappa[-1])

@@ -102,6 +102,7 @@ def dynamic_effects(robot: Robot, *, room: bool = True) -> list[Mapping[str, Any
         s for s in robot.effects
         if known[s["name"]].in_equations and (room or not known[s["name"]].knows_the_room)
     ]  # fmt: skip
+    # sorted, so that the order in a robot file changes neither the compiled model nor the parameter vector
     order = list(known)
     return sorted(
         chosen,
@@ -174,6 +175,7 @@ class Parameters:
             values += [getattr(robot, n) or default for n, default in COMPLIANCE_PARAMETERS.items()]
         values += [pressure_kpa, frequency_hz]
         specs = dynamic_effects(robot, room=True)
+        # effects of zero size are left out only where the structure was made without them
         if [s["name"] for s in specs if not _placed(s)] != [
             n for n in self.structure.effects if not _placed(n)
         ]:

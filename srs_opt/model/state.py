@@ -87,6 +87,7 @@ class StateLayout:
         work is counted from here. Where this model prescribes the curvature, it is that of the actuators.
         """
         adopted, known = np.zeros(self.size), 2 * self.segments
+        # the complex and the compliant model share their yaw momentum; the simplified model's is another
         adopted[:WORK] = state[:WORK]
         adopted[self.kappa.start : self.dkappa.stop] = state[source.kappa.start : source.dkappa.stop]
         first, origin = self.actuator.start, source.actuator.start

@@ -32,7 +32,9 @@ def periodic_actuators(run: Integrator, gait: Gait, p: np.ndarray) -> np.ndarray
         state, decay = np.zeros((2, s)), np.eye(2)
         for forced, one, two in zip(none, bent - none, bending - none):
             stay = np.column_stack([one[:, 0], two[:, 0]])  # segments are alike
+            # (curvature, rate) after a phase is affine in those before: forced + stay (kappa, kappa')
             state, decay = forced + stay @ state, stay @ decay
+        # the fixed point of one period, x = decay x + state
         return np.asarray(np.linalg.solve(np.eye(2) - decay, state)).ravel()
     fine = _fine(durations)
     act = np.zeros(n)
@@ -64,6 +66,7 @@ def actuator_multiplier(run: Integrator, gait: Gait, act: np.ndarray, p: np.ndar
         return float(np.exp(-gait.period_s / max(run.robot.tau1_s, run.robot.tau2_s)))
     durations, valves = gait.phases()
     hold = _hold_function(run.structure)
+    # all perturbed states at once, as columns of one call
     steps = DIFFERENCE.actuator * (1 + np.abs(act))
     ends = act[:, None] + np.hstack([np.diag(steps), -np.diag(steps)])
     for h, valve, k in zip(durations, valves.T, _fine(durations)):
@@ -75,6 +78,7 @@ def actuator_multiplier(run: Integrator, gait: Gait, act: np.ndarray, p: np.ndar
 
 def _fine(durations: np.ndarray) -> np.ndarray:
     """Return how many steps of the integration each phase takes where no closed form exists."""
+    # Runge-Kutta steps of at most 2.5 ms, a twentieth of the built-in robot's shorter time constant
     steps: np.ndarray = np.maximum(np.ceil(durations / 0.0025).astype(int), 2)
     return steps
 

@@ -35,6 +35,7 @@ def other_orbits(robot: Robot, orbit: Orbit, model: str | None = None) -> list[O
     if not run.structure.compliant:
         return []
     cycle = Cycle.of(run, gait)
+    # the body starts bent as it would be without load
     bends = periodic_actuators(run, gait, cycle.p)[: 2 * robot.segments]
     pace = robot.segments * robot.pitch_m / gait.period_s
     starts = [np.concatenate([[share * pace, 0.0, 0.0], bends]) for share in ATTRACTOR.starts]

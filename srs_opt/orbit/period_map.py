@@ -54,7 +54,9 @@ def period_map(
     if run.structure.compliant:
         return _varied(run, x, mesh, valve, p, DIFFERENCE.velocity_m_s / scale)
     kernel = monodromy_kernel(run.structure)
+    # d velocity / d start is the identity at the start
     got = yield StepRequest(kernel, np.concatenate([x, np.eye(3).ravel()]), mesh, valve, p)
+    # by columns, as CasADi stacks matrices
     monodromy = got.states[run.states :, -1].reshape(3, 3, order="F")
     states = got.states[: run.states]
     return PeriodMap(states, got.error_m_s, states[dynamic, -1], monodromy)
@@ -98,6 +100,8 @@ def monodromy_step(structure: Structure) -> ca.Function:
     x, p = ca.SX.sym("x", step.size1_in(0)), ca.SX.sym("p", step.size1_in(3))
     valve, h, m = ca.SX.sym("valve", structure.segments), ca.SX.sym("h"), ca.SX.sym("m", 3, 3)
     x_next, error = step(x, valve, h, p)
+    # neither the pose (motion is the same anywhere) nor the actuators (they are prescribed) carry the
+    # derivative on
     jacobian = ca.jacobian(x_next[VELOCITY], x)[:, VELOCITY]
     both = ca.vertcat(x_next, ca.vec(jacobian @ m))
     return ca.Function("monodromy", [ca.vertcat(x, ca.vec(m)), valve, h, p], [both, error], {"cse": True})

@@ -54,6 +54,7 @@ class Sensitivity:
         """
         omega = 2 * math.pi * wave.frequency_hz
         edges = [intervals[0] for intervals in self.switches]
+        # (13) switches at omega t_on = -beta - asin(phi) and omega t_off = pi - beta + asin(phi)
         opening = [1 / (omega * math.sqrt(1 - phi**2)) for phi in wave.offset]
         return {
             "frequency_hz": -self.period_s / wave.frequency_hz**2,
@@ -88,6 +89,7 @@ def sensitivity(robot: Robot, orbit: Orbit, model: str | None = None) -> Sensiti
     free = run.layout.periodic
     start = [_Direction(0, np.eye(nx)[i], np.zeros(count)) for i in free]
     by_parameter = [_Direction(0, np.zeros(nx), row) for row in np.eye(count)]
+    # df/dT = -f^2: effects that depend on the frequency feel a longer period, too
     longer = np.where([n == "frequency_hz" for n in names], -(gait.frequency_hz**2), 0.0)
     longer_period = _Direction(0, np.zeros(nx), longer, 1 / gait.period_s)
     moved = [_moved_switch(run, orbit, p, s, t) for s, pairs in enumerate(gait.intervals) for on_off in pairs
@@ -95,10 +97,12 @@ def sensitivity(robot: Robot, orbit: Orbit, model: str | None = None) -> Sensiti
     asked = [*by_parameter, longer_period, *moved]
     tangents = _follow(run, orbit, p, [*start, *asked])
     by_start, direct = tangents[: len(free)], tangents[len(free) :]
+    # (I - dG/dz)^-1; tangents are rows here, columns of dG/dz there
     closing = np.linalg.inv(np.eye(len(free)) - by_start[:, -1, free].T)
     derivatives = []
     for direction, own in zip(asked, direct):
         dz = closing @ own[-1, free]
+        # the direct change of the orbit and that of its start, which must repeat
         path = own + np.tensordot(dz, by_start, axes=1)
         derivatives.append(_motion_derivative(orbit, path[:, :3], direction.stretch))
     switches = iter(derivatives[count + 1 :])
@@ -152,6 +156,7 @@ def _follow(run: Integrator, orbit: Orbit, p: np.ndarray, directions: list[_Dire
 
 def _motion_derivative(orbit: Orbit, path: np.ndarray, stretch: float) -> np.ndarray:
     """Return the change of (speed, turn rate) for a change `path` (n, 3) of the poses, by a complex step."""
+    # complex step: exact to rounding as all below is analytic (no hypot, no atan2, no absolute value)
     step = 1j * _TINY
     time = orbit.time_s * (1 + step * stretch)
     x, y, heading = (orbit.pose + step * path).T

@@ -127,6 +127,7 @@ def _reached_from(cycle: Cycle, x: np.ndarray, mesh: Mesh, tolerance: float) -> 
     for count in range(ORBIT.most_periods):
         end, mesh = yield from _accurate_period_map(cycle, x, mesh, tolerance)
         x = end.copy()
+        # motion is the same from any pose: numbers stay small however long it takes
         x[POSE], x[WORK] = 0.0, 0.0
         after = x[cycle.run.layout.dynamic]
         change, before = cycle.size(after - before), after
@@ -185,6 +186,7 @@ class Cycle:
         """Return the cycle of `gait`, with the actuators' periodic state."""
         p = run.pack(gait.pressure_kpa, gait.frequency_hz)
         act = periodic_actuators(run, gait, p)
+        # yaw momentum to yaw rate to the speed of a point LEVER_M away; bends as speeds of that point
         scale = np.array([1.0, 1.0, LEVER_M / _inertia(run, act, p)])
         if run.structure.compliant:
             bend = LEVER_M * run.robot.segment_length_m * np.ones(run.structure.segments)
@@ -239,6 +241,7 @@ def _closed(
         dynamic, mapped, count = yield from _newton(cycle, dynamic, mesh, goal_m_s)
         total += count
         size = cycle.size(mapped.dynamic - dynamic)
+        # where rounding holds Newton above its goal, 1e-6 m/s still counts as closed
         closed = size <= max(goal_m_s, 1e-6)
         if not closed and (attempt == len(goals) - 1 or not size <= ORBIT.rough_m_s):
             raise cycle.no_answer(
@@ -247,6 +250,7 @@ def _closed(
         if closed and goal_m_s == ORBIT.closed_m_s and mapped.error_m_s.max() <= MESH.accepted * tolerance:
             break
     assert mapped is not None
+    # a similarity transform: multipliers stay, entries become comparable
     monodromy = cycle.scale[:, None] * mapped.monodromy / cycle.scale
     return PeriodicSolution(cycle.start(dynamic), mapped.states, mesh, cycle.valve, monodromy, size)
 
@@ -263,6 +267,7 @@ def _newton(
         for factor in (1.0, 0.3, 0.1) if np.isfinite(step).all() else ():
             trial = dynamic + factor * step
             there = yield from cycle.period_map(trial, mesh)
+            # sufficient decrease; not-a-number fails it, too
             if cycle.size(there.dynamic - trial) < (1 - 0.1 * factor) * size:
                 break
         else:  # no descent along Newton's direction: let the motion itself settle
@@ -277,6 +282,7 @@ def _newton(
 def _newton_direction(m: np.ndarray, residual: np.ndarray) -> np.ndarray:
     """Return Newton's step, not-a-number where the monodromy matrix says nothing."""
     try:
+        # z = G(z): (I - dG/dz) dz = G(z) - z
         return np.asarray(np.linalg.solve(np.eye(len(m)) - m, residual))
     except np.linalg.LinAlgError:
         return np.full(len(m), np.nan)

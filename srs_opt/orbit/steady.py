@@ -253,6 +253,7 @@ def travelling(robot: Robot, gait: Gait, model: str | None = None) -> np.ndarray
     orbit = steady_gait(robot, gait, model)
     state: np.ndarray = orbit.solution.start.copy()
     dx, dy, turn = orbit.motion.displacement
+    # a cycle's chord leads by half the cycle's turn over the course at its start
     course = math.atan2(dy, dx) - turn / 2 + (math.pi if orbit.speed_m_s < 0 else 0.0)
     state[POSE] = 0.0, 0.0, state[HEADING] - course
     state[WORK] = 0.0

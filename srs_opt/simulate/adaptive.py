@@ -58,6 +58,7 @@ def finite_steps(request: StepRequest) -> Search[tuple[np.ndarray, np.ndarray]]:
         If the state becomes non-finite.
     """
     got = yield request
+    # a state that is not finite stays so: the last one tells
     if not np.isfinite(got.states[:, -1]).all():
         bad = int(np.argmax(~np.isfinite(got.states).all(axis=0)))
         raise NonFiniteMotionError(float(request.mesh.h_s[:bad].sum()))
@@ -101,6 +102,7 @@ def adapted(
         try:
             states, errors = yield from finite_steps(request)
         except NonFiniteMotionError:
+            # the first piece alone, before its mesh is blamed
             if pieces > 1:
                 pieces = 1
             elif halvings < settings.halvings:
@@ -110,11 +112,14 @@ def adapted(
             continue
         steps = mesh.h_s.size
         worst = errors.reshape(pieces, steps).max(axis=1)
+        # how many pieces in a row the mesh served; True at the end stands for all of them
         good = int(np.argmax([*(worst > settings.accepted * tolerance), True]))
         wasted = good and mesh.wanted(errors[:steps], tolerance) < settings.wasteful * steps
         if (good and not wasted) or attempt >= last_attempt:
+            # what the last attempt gave is kept although it errs
             done = max(good, 1)
             return Adapted(states[:, : done * steps], errors[: done * steps], mesh, done)
+        # with errors raised to the tolerance no step becomes longer
         least = tolerance if attempt >= settings.free_attempts else 0.0
         mesh, pieces = mesh.refined(np.maximum(errors[:steps], least), tolerance), 1
         attempt += 1

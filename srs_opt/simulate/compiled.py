@@ -82,6 +82,7 @@ def _source_digest() -> str:
     for folder in ("model", "effects", "simulate"):
         files += sorted(p for p in (package / folder).rglob("*.*") if p.suffix in (".py", ".in"))
     for file in files:
+        # bytes, not meaning: a changed comment builds anew, which costs time and is never wrong
         digest.update(file.read_bytes())
     return digest.hexdigest()
 
@@ -132,6 +133,7 @@ def shared_library(
         name in key for name in (*registered(), *own_names("model"))
     ):  # their equations are not part of the package's sources
         parts.append(build().serialize())
+    # the zero character between parts keeps two lists from reading alike
     path = cache_folder() / f"srs_{hashlib.sha256(chr(0).join(parts).encode()).hexdigest()[:32]}.so"
     _check_owner(path.parent)
     if path.exists() and _whole(path):

@@ -75,6 +75,7 @@ def compliant_step(structure: Structure) -> ca.Function:
     return ca.Function(
         "step",
         [x, valve, h, p],
+        # 1e-30 keeps the root differentiable where nothing moves
         [following, ca.sqrt(error + shape_error + 1e-30)],
         ["x", "valve", "h", "p"],
         ["x_next", "error"],
@@ -107,8 +108,10 @@ def _stages(
     in_time, power_in_time = chain.rate_in_time(y, dy, acceleration, start, actuator.jerk(act, valve))
     acceleration = h * acceleration
     step = h * GAMMA
+    # E of the module's description, factorized once for all six stages
     solve = jacobian.mass.plus(jacobian.by_rate, -step).plus(jacobian.by_place, -(step**2)).solver()
     k: list[_Increment] = []
+    # the embedded result is the fifth stage's point plus k_5
     last: tuple[float, ...] = (*STAGES[4], 1.0)
     for i in range(6):  # as in `rosenbrock.step_function`, places and accelerations eliminated
         weights = STAGES[i] if i < 5 else last
@@ -118,12 +121,15 @@ def _stages(
                 y + at.place, dy + at.velocity, acceleration + at.acceleration, drive(shapes[NODES[i]]), h
             )
         else:
+            # the accelerations at the start were solved for: g = 0 there
             residual, power = zero, h * power
         coupled = _combined(COUPLING[i], k, n)
         r_place = h * (dy + at.velocity) + coupled.place
         r_velocity = acceleration + at.acceleration + coupled.velocity
+        # the residual is h g already; its rate in time takes h once more
         right = residual + h * h * TIME_WEIGHTS[i] * in_time
         right += jacobian.mass.times(r_velocity) + step * jacobian.by_place.times(r_place)
+        # from the velocity's increment those of place and h Y'' follow without a further system
         velocity = solve(GAMMA * right)
         place = GAMMA * (r_place + h * velocity)
         work = (
@@ -131,6 +137,7 @@ def _stages(
         )
         work += h * h * TIME_WEIGHTS[i] * power_in_time
         k.append(_Increment(place, velocity, velocity / GAMMA - r_velocity, GAMMA * work))
+    # stiffly accurate: k_6 is the difference of the fourth- and the third-order result
     error = k[5].velocity
     squared = error.T @ jacobian.mass.times(error) / chain.model.total_mass()
     return [_scaled(w, i) for w, i in zip((*last, 1.0), k)], squared, shapes[1.0]
@@ -185,6 +192,7 @@ def _conversions(model: CompliantModel) -> tuple[ca.Function, ca.Function]:
     chambers = Chambers.of(model, Drive(*free, ca.SX.zeros(3, 1), model.no_load_acceleration))
     bend, rate = chambers.kappa(y), chambers.dkappa(y, dy)
     turn, spin = ca.sum1(y[2:]) / n, ca.sum1(dy[2:]) / n
+    # the centre of mass is the tail less its place in the body, with rates likewise
     tail, tail_rate, momentum = body(bend, rate, spin, *free, p)
     cos, sin = ca.cos(turn), ca.sin(turn)
     tail_x, tail_y = turn_by(cos, sin, tail[0], tail[1])

@@ -66,6 +66,7 @@ def cycle_motion(
         radius = float(weights @ distance)
         if radius <= MOTION.straight_radius_m:
             reach = np.hypot(outline_x - centre[0], outline_y - centre[1])
+            # the smallest distance as the largest of the negative, so that its peak is interpolated too
             outside, inside = largest(reach) - radius + half_width, radius + largest(-reach) + half_width
             forward = _forward(displacement, pose, heading, centre, weights)
             speed = forward * abs(turn) / period * radius

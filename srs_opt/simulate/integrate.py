@@ -143,6 +143,7 @@ class Integrator:
         timeline = timeline.delayed(valve_delay_s(self.robot))
         times, states, errors = [np.zeros(1)], [x[:, None]], []
         start = 0.0
+        # a gait's cycles are alike: each begins with the mesh that served the one before
         known: dict[bytes, Mesh] = {}
         for piece, key, repeats in _runs_of_alike(self.pieces(timeline)):
             p = self.pack(float(piece.pressure_kpa[0]), float(piece.frequency_hz[0]))
@@ -213,6 +214,7 @@ def _runs_of_alike(pieces: list[Timeline]) -> list[tuple[Timeline, bytes, int]]:
     runs: list[tuple[Timeline, bytes, int]] = []
     for piece in pieces:
         setting = np.array([piece.pressure_kpa[0], piece.frequency_hz[0]])
+        # to a nanosecond: cycles cut from a long timeline differ by rounding
         key = np.round(piece.duration_s, 9).tobytes() + piece.valve.tobytes() + setting.tobytes()
         if runs and runs[-1][1] == key:
             runs[-1] = (runs[-1][0], key, runs[-1][2] + 1)
@@ -236,6 +238,7 @@ def _pieces(timeline: Timeline, pressure_kpa: np.ndarray) -> list[Timeline]:
     for k, duration_s in enumerate(timeline.duration_s.tolist(), start=1):
         elapsed += duration_s
         changed = k < n and setting[k] != setting[start]
+        # a cycle's durations may add up to a little less than its period
         full = elapsed >= 1 / setting[start][1] - 1e-9 or k - start >= longest_phases
         if k == n or changed or full:
             pieces.append(timeline.part(slice(start, k)))

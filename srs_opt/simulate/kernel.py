@@ -17,6 +17,7 @@ from srs_opt.simulate.lanes import step_source
 from srs_opt.simulate.zero_copy import ZeroCopy
 
 LANES = 4  # gaits per call: a vector register of doubles on most machines, two on the others
+# no fused multiply-adds: a gait's bits must not depend on the processor
 _FLAGS = ("-O1", "-fPIC", "-shared", "-fno-math-errno", "-ffp-contract=off", "-w")
 _DOUBLES = ctypes.POINTER(ctypes.c_double)
 

@@ -162,6 +162,7 @@ def _statements(code: list[_Instruction], part: range, shared: set[int]) -> list
         if op == ca.OP_INPUT:
             value = f"in{of[0]}[{of[1]}]"
         elif op == ca.OP_CONST:
+            # repr reads back as the same double
             value = f"all({code[k].constant!r})"
         elif op == ca.OP_DIV and of[1] in shared:  # one division for all of a part's
             if of[1] not in inverted:

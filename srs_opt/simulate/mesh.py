@@ -30,6 +30,7 @@ class Mesh:
     @staticmethod
     def uniform(durations: np.ndarray, step_s: float, least: int = 4) -> Mesh:
         """Divide every phase into equal steps of at most `step_s`."""
+        # 1e-9: a duration that is a multiple of the step but for rounding takes no further step
         counts = np.maximum(np.ceil(durations / step_s - 1e-9).astype(int), least)
         return Mesh(np.repeat(durations / counts, counts), np.repeat(np.arange(durations.size), counts))
 
@@ -66,6 +67,7 @@ class Mesh:
         """
         density = _density(error, tolerance)
         times, edges = np.cumsum([0.0, *h_s]), np.cumsum([0.0, *durations])
+        # cut at the nodes of both, each part with its share of its old step's new ones
         nodes = np.unique([*np.minimum(times, edges[-1]), *edges])
         middles = (nodes[:-1] + nodes[1:]) / 2
         step = np.searchsorted(times, middles).clip(1, h_s.size) - 1
@@ -78,6 +80,7 @@ def _divided(h_s: np.ndarray, phase: np.ndarray, density: np.ndarray, least: int
     """Return a mesh with `density` (n,) new steps in place of each old one, at least so many per phase."""
     phases, first = np.unique(phase, return_index=True)
     totals = np.add.reduceat(density, first)
+    # rounded up and all densities of a phase raised with it: steps only get shorter
     counts = np.maximum(np.ceil(totals).astype(int), least)
     span_s = float(h_s.sum())
     if counts.sum() > max(STEP.most_per_s * span_s, STEP.most):
@@ -92,6 +95,7 @@ def _divided(h_s: np.ndarray, phase: np.ndarray, density: np.ndarray, least: int
     times = np.concatenate([[0.0], np.cumsum(h_s)])
     nodes = np.interp(np.arange(counts.sum() + 1), level, times)
     edges = np.concatenate([[0], np.cumsum(counts)])
+    # set and not interpolated: a step that ends a rounding error after a switch would straddle it
     nodes[edges] = times[[*first, density.size]]
     return Mesh(np.diff(nodes), np.repeat(phases, counts))
 

@@ -38,6 +38,7 @@ class _BodyField:
         body = ca.vertcat(pose_rate, rate, power)
         ddkappa = ca.SX.sym("ddkappa", m.links - 1)
         moving = ca.vertcat(m.kappa, m.dkappa, m.time)
+        # the shape is a known function of time, so the field depends on time through it
         in_time = ca.jtimes(body, moving, ca.vertcat(m.dkappa, ddkappa, 1))
         self.value = ca.Function("body", [pose, velocity, *shape, m.time, p], [body])
         self.jacobians = ca.Function(
@@ -49,6 +50,7 @@ class _BodyField:
 
 def _inverse3(a: ca.SX) -> ca.SX:
     """Return the inverse of a 3 x 3 matrix by cofactors."""
+    # cofactors by cyclic indices need neither signs nor pivoting: an expression without branches
     c = [[a[(i + 1) % 3, (j + 1) % 3] * a[(i + 2) % 3, (j + 2) % 3] for j in range(3)] for i in range(3)]
     d = [[a[(i + 1) % 3, (j + 2) % 3] * a[(i + 2) % 3, (j + 1) % 3] for j in range(3)] for i in range(3)]
     cofactor = ca.vertcat(*[ca.horzcat(*[c[i][j] - d[i][j] for j in range(3)]) for i in range(3)])
@@ -61,11 +63,13 @@ class _StageSolver:
 
     def __init__(self, by_pose: ca.SX, by_velocity: ca.SX, h: ca.SX) -> None:
         # pose' depends on the pose only through the heading, so its block is nilpotent
+        # hence (I/gamma - h A)^-1 = gamma (I + gamma h A), A^2 = 0
         self.lift = GAMMA * (ca.SX.eye(3) + GAMMA * h * by_pose[POSE, :])
         self.pose_by_velocity = h * by_velocity[POSE, :]
         self.velocity_by_pose = h * by_pose[VELOCITY, :]
         self.work_by_pose, self.work_by_velocity = h * by_pose[WORK, :], h * by_velocity[WORK, :]
         matrix = ca.SX.eye(3) / GAMMA - h * by_velocity[VELOCITY, :]
+        # Schur complement: what the eliminated pose does to the velocity
         matrix -= self.velocity_by_pose @ self.lift @ self.pose_by_velocity
         self.inverse = _inverse3(ca.densify(matrix))
 
@@ -120,6 +124,7 @@ def step_function(structure: Structure) -> ca.Function:
         half = actuator.advance(actuator.advance(act, valve, h / 2), valve, h / 2)
         turn_rate_error = parameters["segment_length_m"] * (half.dkappa - last.dkappa)
         shape_error, last = ca.sumsqr(LEVER_M * turn_rate_error), half
+    # yaw momentum to yaw rate to the speed of a point LEVER_M away
     spin_error = LEVER_M * k[5][5] / inertia
     # 1e-30 keeps the root differentiable where nothing moves
     error = ca.sqrt(k[5][3] ** 2 + k[5][4] ** 2 + spin_error**2 + shape_error + 1e-30)

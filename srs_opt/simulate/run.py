@@ -135,6 +135,7 @@ def simulate_valves(
 def _second_half(
     run: Integrator, trajectory: Trajectory, gait: Gait
 ) -> tuple[float | None, float | None, float | None]:
+    # whole cycles, also where rounding leaves the last a little short
     cycles = int(trajectory.time_s[-1] / gait.period_s + 1e-9)
     if cycles < 2:
         return None, None, None

@@ -4,6 +4,7 @@ Source: E. Hairer and G. Wanner, Solving Ordinary Differential Equations II, IV.
 """
 
 GAMMA = 0.25
+# alpha_i, gamma_i, and a_ij, c_ij of the transformed variables (IV.7), in which no stage multiplies by J
 NODES = (0.0, 0.386, 0.21, 0.63, 1.0, 1.0)
 TIME_WEIGHTS = (0.25, -0.1043, 0.1035, -0.03620000000000023, 0.0, 0.0)
 STAGES = (

@@ -37,6 +37,7 @@ class Timeline:
     def of_gait(gait: Gait, duration_s: float) -> Timeline:
         """Play `gait` from its time 0 for `duration_s`."""
         durations, valves = gait.phases()
+        # one cycle keeps the bits of its durations, which cutting would not
         if duration_s == gait.period_s:
             return Timeline.constant(durations, valves, gait.pressure_kpa, gait.frequency_hz)
         cycles = int(np.ceil(duration_s / gait.period_s - 1e-9))
@@ -90,6 +91,7 @@ class Timeline:
         """Return the timeline cut off at `end_s`."""
         ends = np.cumsum(self.duration_s)
         starts = ends - self.duration_s
+        # no phase that only rounding makes
         keep = starts < end_s - 1e-12
         duration = np.minimum(ends, end_s)[keep] - starts[keep]
         return Timeline(duration, self.valve[:, keep], self.pressure_kpa[keep], self.frequency_hz[keep])
