@@ -169,6 +169,7 @@ def run_stages(
         steps += taken
         with suppress(NoAnswerError):
             found = _judged(problem, gait)
+            # judged at the robots' own friction: a later stage is no better by being later
             best = found if best is None or found.score.total > best.score.total else best
     return replace(best or _judged(problem, gait), steps=tuple(steps))
 
@@ -231,6 +232,7 @@ def mesh_for(orbits: tuple[Orbit, ...], elements: int) -> Mesh:
 def elements_until(orbits: tuple[Orbit, ...], elements: int) -> tuple[np.ndarray, np.ndarray]:
     """Return fractions of the cycle after the first switch and how many elements should end before each."""
     grid = np.linspace(0.0, 1.0, 1001)
+    # the uniform share keeps elements where the motion will get sharp only later
     level = elements * CONTINUATION.uniform_share * grid
     for orbit in orbits:
         gait = orbit.gait
@@ -284,6 +286,7 @@ def bounded(
 
     def binding(found: np.ndarray) -> bool:
         margin = 1e-3 * span
+        # a limit of the problem itself is no reason to solve again
         at_low = (found[part] < low[part] + margin) & (low[part] > limit_low + margin)
         at_high = (found[part] > high[part] - margin) & (high[part] < limit_high - margin)
         return bool((at_low | at_high).any())

@@ -25,6 +25,7 @@ def bend_acceleration(model: CompliantModel, velocity: ca.SX, heading: ca.SX) ->
     place, rate = model.chain, model.link_velocities(velocity[0], velocity[1], yaw_rate)
     y = ca.vertcat(place.x[0], place.y[0], place.angle)
     dy = ca.vertcat(rate.x[0], rate.y[0], rate.angle)
+    # where in the room does not matter: effects that know the room have no steady gait
     frame = ca.vertcat(0, 0, heading)
     drive = Drive(model.no_load, model.no_load_rate, frame, model.no_load_acceleration)
     force, _ = chain.residual(y, dy, ca.SX.zeros(chain.size, 1), drive, ca.SX(1))

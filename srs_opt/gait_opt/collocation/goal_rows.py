@@ -83,6 +83,7 @@ def goal_rows(layout: Layout, kind: GoalKind, times: Times | None = None) -> Goa
     for i in range(0 if first.relaxed else first.segments):
         switches = ca.vertsplit(shared[2 + 2 * k * i : 2 + 2 * k * (i + 1)])
         on, off = switches[:k], switches[k:]
+        # switch times are fractions of the period, so the dwell is one, too
         least = number["min_dwell_s"] * frequency
         for start, end, following in zip(on, off, [*on[1:], on[0] + 1]):
             not_negative("dwell", end - start - least)
@@ -93,6 +94,7 @@ def goal_rows(layout: Layout, kind: GoalKind, times: Times | None = None) -> Goa
     for r, u in enumerate(own):
         speed, turn_rate, _, left, right = ca.vertsplit(u)
         if kind.radius:
+            # speed = turn rate x radius, regular where the turn rate passes zero
             arc = number["radius_m"] * turn_rate
             if r == 0:
                 found.append(("radius", speed - arc, 0.0, 0.0))
@@ -100,6 +102,7 @@ def goal_rows(layout: Layout, kind: GoalKind, times: Times | None = None) -> Goa
                 not_negative("radius", speed - (1 - COLLOCATION.other_robots_share * GOAL.turn_error) * arc)
                 not_negative("radius", (1 + COLLOCATION.other_robots_share * GOAL.turn_error) * arc - speed)
         merit, rows = _formulas_of(aim, layout.kinds[r], shared, u, number, weights[r], parameters[r])
+        # epigraph form: the least of the robots' merits is maximized without a kink
         not_negative("merit", merit / units[r] - shared[layout.merit])
         found += [
             (name, rows[j], low, high)

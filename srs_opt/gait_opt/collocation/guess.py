@@ -40,6 +40,7 @@ def gait_of(switches: np.ndarray, frequency_hz: float, pressure_kpa: float, inte
 
     def time(fraction: float) -> float:
         t = float(fraction % 1.0 * period)
+        # a rounding error before the end is the start of the next cycle
         return t if t < period * (1 - 1e-12) else 0.0
 
     pairs = tuple(tuple((time(on), time(off)) for on, off in row.T) for row in rows)
@@ -63,8 +64,10 @@ def states_over_cycle(
     turn = float(orbit.motion.displacement[2])
     u_x, u_y = (np.interp(spread, time_s, states[VELOCITY][i]) for i in range(2))
     heading = np.interp(spread, time_s, orbit.pose[:, 2]) - turn * spread / period
+    # the last sample is the first of the next cycle
     v_x, v_y = (float(np.mean(v[:-1])) for v in rotate(heading, u_x, u_y))
     sign = 1.0 if v_x >= 0 else -1.0
+    # turns the frame so that the mean velocity points ahead (or straight back)
     tilt = -np.arctan2(sign * v_y, sign * v_x)
     speed = sign * float(np.hypot(v_x, v_y))
     x, y = rotate(
@@ -78,6 +81,7 @@ def states_over_cycle(
             tilt - turn * spread / period, np.full(spread.size, centre[0]), np.full(spread.size, centre[1])
         )
         ahead, aside = x - cx, y - cy
+    # the program's frame is the one with zero means
     ahead, aside = ahead - ahead[:-1].mean(), aside - aside[:-1].mean()
     places = (at * period + first_s) % period
     columns = [np.interp(places, time_s, states[VELOCITY][i]) for i in range(3)]
@@ -123,6 +127,7 @@ def _deviations(
     )
     actuators = np.stack([np.interp(places, orbit.time_s, row) for row in own])
     n = kind.segments
+    # nonlinear actuators are stated by how far they are from the closed form
     actuators[:n] -= np.asarray(closed[0])
     actuators[n : 2 * n] -= np.asarray(closed[1])
     return list(actuators)
@@ -164,10 +169,13 @@ def unknowns_from_orbits(
 
 def state_scales(x: np.ndarray, kind: PointKind) -> np.ndarray:
     """Return typical sizes of the states over a cycle, (states,)."""
+    # scaled by their sizes, all states and defects are of order one, as IPOPT's tolerances suppose
     size = np.abs(x).max(axis=0)
+    # states of one kind share a scale: velocities, yaw momentum, heading, places, then bends and actuators
     groups = [(0, 2), (2, 3), (3, 4), (4, 6)]
     edges = sorted({BODY, BODY + kind.bends // 2, kind.moving, kind.states})
     groups += list(pairwise(edges))
+    # nothing is divided by a zero size; a yaw momentum is smaller than other states by itself
     least = np.full(x.shape[1], 1e-3)
     least[2] = 1e-6
     for a, b in groups:

@@ -150,10 +150,13 @@ def row_outputs(layout: Layout, robot: int) -> tuple[sparse.csr_matrix, sparse.c
     s, o = kind.states, kind.outputs
     first = layout.states(robot).start
     e, i, j = (v.ravel() for v in np.meshgrid(np.arange(n), np.arange(DEGREE), np.arange(s), indexing="ij"))
+    # a defect: sum_k D_ki x_k - (element's duration) x'(point i), in units of the state
     row = (e * DEGREE + i) * s + j
     out_rows, out_columns, out_data = [row], [(e * DEGREE + i) * o + j], [np.full(row.size, -1.0)]
     fix_rows, fix_columns, fix_data = [], [], []
     for k in range(DEGREE + 1):
+        # the last Radau node is the element's end, so the next starts there; the first one after the last
+        # closes the cycle
         source = ((e - 1) % n) * DEGREE + DEGREE - 1 if k == 0 else e * DEGREE + k - 1
         fix_rows.append(row)
         fix_columns.append(first + source * s + j)
@@ -164,6 +167,7 @@ def row_outputs(layout: Layout, robot: int) -> tuple[sparse.csr_matrix, sparse.c
         out_rows.append(np.full(point.size, rows + q))
         out_columns.append(point * o + s + q)
         out_data.append(np.tile(WEIGHTS, n))
+    # the third quadrature is the friction work itself, the first two means that vanish
     fix_rows.append(np.array([rows + 2]))
     fix_columns.append(np.array([layout.unknown(robot, "work")]))
     fix_data.append(np.array([-1.0]))
@@ -171,6 +175,7 @@ def row_outputs(layout: Layout, robot: int) -> tuple[sparse.csr_matrix, sparse.c
     ends = np.arange(n) * DEGREE + DEGREE - 1
     reach = 2 * kind.structure.links - 1 if kind.envelope else 0
     for path in range(kind.paths):
+        # reach to the left at most left, to the right (negative) at most right
         sides = (("left", -1.0), ("right", 1.0)) if path < reach else ((None, 0.0),)
         for side, sign in sides:
             mine = rows + np.arange(n)

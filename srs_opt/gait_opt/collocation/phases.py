@@ -14,6 +14,7 @@ Cuts = tuple[np.ndarray, ...]
 
 def switch_order(switches: np.ndarray) -> np.ndarray:
     """Return the switches' indices in the order in which they happen in a cycle, the first at time 0."""
+    # switches that meet but for rounding keep their order: none wraps to the end of the cycle
     fraction = np.mod(switches - switches[0] + COLLOCATION.coincident_cycles, 1.0)
     return np.argsort(fraction, kind="stable")
 
@@ -68,11 +69,13 @@ def phase_times(switches: np.ndarray, order: np.ndarray, cuts: Cuts) -> tuple[Me
         lengths[k, a] -= 1.0
         offsets[k] = shift_b - shift_a
         begun = set(order[: k + 1].tolist())
+        # a switch still to come in this cycle was last made in the cycle before
         last = [whole[j] * -1.0 - (0.0 if j in begun else 1.0) for j in range(n)]
         for begin, width in zip(cuts[k], np.diff(cuts[k])):
             edges.append(starts[k] + phase_lengths[k] * begin)
             for c in NODES:
                 share = begin + c * width
+                # place and width are linear in the two switches that bound the phase
                 for row, weights in ((2 * point, (1 - share, share)), (2 * point + 1, (-width, width))):
                     rows += [row, row]
                     columns += [a, b]

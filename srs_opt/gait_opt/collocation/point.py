@@ -197,6 +197,7 @@ def _shape(
         rates = actuator.rates(own, s.switches)
         return own.kappa, own.dkappa, rates.dkappa, rates.vector()
     kappa, dkappa, valve = ca.vertsplit(closed, kind.segments)
+    # the same spread time constants as in the closed form, or the deviation would not vanish
     tau1, tau2 = time_constants(actuator.parameters)
     linear = acceleration(actuator.target(valve), kappa, dkappa, tau1, tau2)
     if actuator.linear:
@@ -259,12 +260,14 @@ def _equations(kind: PointKind, s: _Symbols, p: ca.SX, closed: ca.SX) -> ca.SX:
         deviation_rate,
     )
     duration = s.width / s.frequency
+    # the means of `ahead` and `aside`, which fix the frame, and the work
     quadratures = ca.vertcat(s.width * s.x[AHEAD], s.width * s.x[ASIDE], duration * power)
     paths = []
     if kind.envelope:
         paths.append(_lateral_reach(m, heading, ahead, aside, s.turn_rate / s.speed))
     if kind.curvature:
         paths.append(m.kappa)
+    # per element and in the states' scales: rows of defects are of order one
     out = ca.vertcat(duration * rates / s.scale, quadratures, *paths)
     for old, new in given:
         out = ca.substitute(out, old, new)
@@ -318,6 +321,7 @@ def point_functions(kind: PointKind) -> PointFunctions:
         merit = ca.dot(multipliers, out)
         both, gradient = ca.hessian(merit, ca.vertcat(y, closed))
         n = y.numel()
+        # second derivatives of f(y, c(y)): f_yy + f_yc c' + (f_yc c')^T + c'^T f_cc c' + f_c c''
         mixed = both[:n, n:] @ inner
         weights = ca.SX.sym("weights", closed.numel())
         curved = ca.substitute(ca.hessian(ca.dot(weights, curvature), y)[0], weights, gradient[n:])

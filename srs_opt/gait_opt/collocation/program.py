@@ -114,7 +114,9 @@ class Program:
         rows.append(g)
         spread = _selection(self.head, layout.size)
         jacobians.append(jac @ spread)
+        # the upper triangle is all that IPOPT's interface reads
         hessian += ca.triu(spread.T @ hess @ spread)
+        # IPOPT minimizes
         f = -z[layout.merit]
         gradient = ca.DM(layout.size, 1)
         gradient[layout.merit] = -1.0
@@ -194,6 +196,8 @@ class Program:
         changes = dict(options or {})
         if warm is not None:
             changes = {
+                # multipliers of a near solution only help if the barrier starts low and bounds do not push
+                # away
                 "warm_start_init_point": "yes", "mu_init": 1e-4, "warm_start_bound_push": 1e-6,
                 "warm_start_mult_bound_push": 1e-6, "mu_strategy": "monotone", **changes,
             }  # fmt: skip

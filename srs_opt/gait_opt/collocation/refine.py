@@ -13,6 +13,7 @@ from srs_opt.gait_opt.collocation.program import Program, Solution
 from srs_opt.gait_opt.settings import COLLOCATION
 
 BETWEEN = np.array([0.08, 0.4, 0.85])  # places inside an element, away from its nodes
+# of the local error with three Radau nodes per element
 _ORDER = 4.0
 
 
@@ -40,6 +41,7 @@ def defects(p: Program, solution: Solution, parameters: np.ndarray, mesh: Mesh, 
     half_width = parameters[sizes[2]]
     numbers, scale = (parameters[sizes[3 + 3 * robot + k] : sizes[4 + 3 * robot + k]] for k in range(2))
     x = solution.z[layout.states(robot)].reshape(n, DEGREE, s)
+    # an element starts at the end of the one before, the first at the end of the cycle
     nodes = np.concatenate([np.roll(x[:, -1:], 1, axis=0), x], axis=1)
     values, derivatives = _basis()
     between = np.einsum("ejs,jb->ebs", nodes, values)
@@ -69,6 +71,7 @@ def defects(p: Program, solution: Solution, parameters: np.ndarray, mesh: Mesh, 
 
 def refined_cuts(defect: np.ndarray, cuts: Cuts, tolerance: float) -> Cuts:
     """Return cuts with every element whose defect is above `tolerance` split into as many as should do."""
+    # defects fall as width^4: so many parts bring one to the tolerance
     growth = np.clip(
         (np.maximum(defect, 1e-12) / tolerance) ** (1 / _ORDER), 1.0, COLLOCATION.largest_refinement
     )

@@ -69,6 +69,7 @@ def _gather(
     entries: int,
     fixed: sparse.coo_matrix,
 ) -> Gather:
+    # column by column, the order of CasADi's nonzeros
     keys = np.concatenate([c * shape[0] + r, fixed.col * shape[0] + fixed.row]).astype(np.int64)
     unique, place = np.unique(keys, return_inverse=True)
     column, row = np.divmod(unique, shape[0])
@@ -114,6 +115,7 @@ def hessian_gather(
     rows, columns = block_coordinates(pattern, points)
     csr = sparse.csr_matrix(inputs)
     r, c, coefficient, entry = _pairs(rows, columns, csr, csr)
+    # an entry off the diagonal of a triangle stands for two of the symmetric block
     mirrored = rows[entry] != columns[entry]
     r, c = np.concatenate([r, c[mirrored]]), np.concatenate([c, r[mirrored]])
     coefficient = np.concatenate([coefficient, coefficient[mirrored]])

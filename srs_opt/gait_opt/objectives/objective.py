@@ -114,6 +114,7 @@ class Formulas:
         """Return merit and constraints in numbers; a merit that is no finite number is a very bad one."""
         merit, rows = self.function(scalars, switches, curvature)
         value = float(merit)
+        # a search goes on past a merit that is not a number
         return value if np.isfinite(value) else -1e4, np.asarray(rows).ravel()
 
 
