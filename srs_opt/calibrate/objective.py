@@ -1,4 +1,4 @@
-"""What a fit makes small: misfit, priors, trial-to-trial scatter; and the step that derivatives ask for."""
+"""What a fit minimises: misfit, priors, trial-to-trial scatter; and the step that the derivatives ask for."""
 
 from __future__ import annotations
 

@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from srs_opt.calibrate.apart import outlying_trials
 from srs_opt.calibrate.candidates import fitted_coordinates
 from srs_opt.calibrate.clean import cleaned
 from srs_opt.calibrate.colour import coloured
@@ -16,9 +15,10 @@ from srs_opt.calibrate.fit_settings import FIT
 from srs_opt.calibrate.maps import fit_maps
 from srs_opt.calibrate.model import Model
 from srs_opt.calibrate.noise import Noise, noise_of
+from srs_opt.calibrate.outlying_trials import outlying_trials
 from srs_opt.calibrate.result import Calibration, calibration
-from srs_opt.calibrate.slow import Amplitudes, smooth_part
 from srs_opt.calibrate.smooth import DRIFTS, unit_terms
+from srs_opt.calibrate.smooth_variance import Amplitudes, smooth_part
 from srs_opt.errors import InputError
 from srs_opt.measurement.records import DataSet, Trial
 from srs_opt.parallel import HERE, Executor

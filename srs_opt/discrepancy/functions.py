@@ -10,7 +10,7 @@ import numpy as np
 
 from srs_opt.calibrate.noise import Noise
 from srs_opt.calibrate.observe import Prediction
-from srs_opt.calibrate.slow import Amplitudes
+from srs_opt.calibrate.smooth_variance import Amplitudes
 from srs_opt.geometry import quarter_turn, unit_vectors
 from srs_opt.measurement.records import Trial
 

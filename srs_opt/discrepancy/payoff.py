@@ -1,4 +1,4 @@
-"""What the name buys: the fastest gaits of the calibrated and the corrected robot, on the corrected one."""
+"""What a named effect is worth: the fastest gaits of calibrated and corrected robot, on the corrected one."""
 
 from __future__ import annotations
 

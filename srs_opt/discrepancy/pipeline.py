@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from srs_opt.calibrate.apart import outlying_trials
 from srs_opt.calibrate.candidates import Candidate, all_candidates, fitted_coordinates
 from srs_opt.calibrate.clean import cleaned
 from srs_opt.calibrate.experiment import Experiment
@@ -17,6 +16,7 @@ from srs_opt.calibrate.fit import Fit
 from srs_opt.calibrate.forms import form_of_entry
 from srs_opt.calibrate.model import Model
 from srs_opt.calibrate.noise import Noise, noise_of, track_of
+from srs_opt.calibrate.outlying_trials import outlying_trials
 from srs_opt.discrepancy.alike import Pair, alike_pairs
 from srs_opt.discrepancy.describe import Description, confirmation, describe_gap
 from srs_opt.discrepancy.design import NextExperiment, next_experiment, repeat_of, rivals_of

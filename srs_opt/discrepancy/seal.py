@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from srs_opt.calibrate.apart import own_scatter
 from srs_opt.calibrate.experiment import Experiment
 from srs_opt.calibrate.fit import Fit
+from srs_opt.calibrate.outlying_trials import own_scatter
 from srs_opt.discrepancy.gap_settings import SEAL
 from srs_opt.discrepancy.motions import motion_errors
 from srs_opt.discrepancy.settings import ADEQUACY, AdequacySettings

@@ -12,7 +12,7 @@ from srs_opt.calibrate.experiment import Experiment, Point
 from srs_opt.calibrate.fit import start_point
 from srs_opt.calibrate.fit_settings import FIT
 from srs_opt.calibrate.noise import Noise
-from srs_opt.calibrate.slow import smooth_part
+from srs_opt.calibrate.smooth_variance import smooth_part
 from srs_opt.discrepancy.diagnostics import Diagnostics, explainable, explained, needed_gain
 from srs_opt.discrepancy.examine import examined, linearised, screened_of
 from srs_opt.discrepancy.functions import ResidualFunctions

@@ -14,7 +14,7 @@ from srs_opt.calibrate.experiment import Point
 from srs_opt.calibrate.noise import Noise
 from srs_opt.calibrate.normal_equations import NormalEquations
 from srs_opt.calibrate.rejection import left_out
-from srs_opt.calibrate.slow import Amplitudes, smooth_part
+from srs_opt.calibrate.smooth_variance import Amplitudes, smooth_part
 from srs_opt.measurement.records import DataSet, Trial
 from srs_opt.robot import wpi_srs
 
