@@ -158,16 +158,6 @@ class MotionTable:
         local = _between(self.pose[rows, now, low], self.pose[rows, now, low + 1], weight)
         return compose(start[:, None], local)
 
-    def move_one(
-        self, x: float, y: float, heading: float, before: int, speed_m_s: float, now: int
-    ) -> tuple[Array, float]:
-        """Return poses (SAMPLES + 1, 3) and the speed after one cycle of gait `now`."""
-        before = self.row(before)
-        low, weight = self._level(before, speed_m_s)
-        tables = self.pose[before, now], self.speed_after_m_s[before, now]
-        local, after = ((1 - weight) * t[low] + weight * t[low + 1] for t in tables)
-        return compose(np.array([x, y, heading]), local), float(after)
-
     def bent(self, bending: Bending) -> MotionTable:
         """Return the table with measured factors on all its cycles."""
         swing = self.course[None, :-1] - self.course[:, None]

@@ -7,7 +7,7 @@ triangles of all sheets, their mirror images and their reversed waves is what th
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -280,11 +280,3 @@ def _cells(part: GaitMap, calibration: DriveCalibration) -> list[np.ndarray]:
             square = table[[i, i, i + 1, i + 1], [j, j + 1, j, j + 1]]
             found += [square[k] for k in ([0, 1, 2], [1, 3, 2]) if np.isfinite(square[k]).all()]
     return found
-
-
-def with_calibration(drive: Drive, calibration: DriveCalibration) -> Drive:
-    """Return the drive under another calibration (its present one is undone first)."""
-    corners = drive.corners.copy()
-    speed, turn = drive.calibration.inverse_motion(corners[..., 4], corners[..., 5])
-    corners[..., 4], corners[..., 5] = calibration.motion(speed, turn)
-    return replace(drive, corners=corners, calibration=calibration)

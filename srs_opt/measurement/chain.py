@@ -58,10 +58,6 @@ class Chain:
         lengths_m: Array = np.linalg.norm(np.diff(self.straight_m, axis=0), axis=1)
         return lengths_m
 
-    def between_m(self, a: int, b: int) -> float:
-        """Distance of two markers when straight: they cannot be farther apart, save for offsets sideways."""
-        return float(np.linalg.norm(self.straight_m[a] - self.straight_m[b]))
-
 
 def chain_of(robot: Robot, spots: Spots | None = None) -> Chain:
     """Return the geometry of `robot`, with markers at `spots` (none: one on every link's centre)."""

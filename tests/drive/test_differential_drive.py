@@ -8,7 +8,7 @@ import pytest
 
 from srs_opt.drive.__main__ import main
 from srs_opt.drive.calibration import DriveCalibration, Factor, fit_factor, load_calibration, save_calibration
-from srs_opt.drive.drive import Drive, drive_from_map, with_calibration
+from srs_opt.drive.drive import Drive, drive_from_map
 from srs_opt.drive.fit import calibrate_drive, load_measured_map
 from srs_opt.errors import InputError, OutOfReachError
 from srs_opt.gait import Wave
@@ -72,9 +72,9 @@ def test_planted_factors_are_recovered(simulated, tmp_path):
     assert again == calibration
 
 
-def test_calibrated_drive_answers_in_measured_units(drive):
+def test_calibrated_drive_answers_in_measured_units(simulated):
     calibration = DriveCalibration(Factor(0.8, 0.01, 0.02, 9), Factor(1.25, 0.01, 0.03, 9))
-    corrected = with_calibration(drive, calibration)
+    corrected = drive_from_map(wpi_srs(), simulated, calibration)
     chosen = corrected.gait_for(0.16, 0.3)
     assert chosen.speed_m_s == pytest.approx(0.16, rel=0.03)
     assert chosen.orbit.speed_m_s == pytest.approx(0.2, rel=0.03)

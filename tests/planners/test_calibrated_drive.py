@@ -36,10 +36,10 @@ def test_steady_cycles_are_displaced_as_calibrated(gaits, motion):
         speed, pose, before = 0.0, np.zeros(3), motion.rest
         bent = np.zeros(3)
         for _ in range(25):
-            moved, after = motion.move_one(0, 0, 0, before, speed, index)
-            pose = moved[-1]
-            bent = table.move_one(0, 0, 0, before, speed, index)[0][-1]
-            speed, before = after, index
+            moved = motion.move(0, 0, 0, before, speed)
+            pose = moved.pose[index, -1]
+            bent = table.move(0, 0, 0, before, speed).pose[index, -1]
+            speed, before = moved.speed_m_s[index], index
         assert bent == pytest.approx(FACTORS.displacement(pose), abs=2e-4)
         assert table.course[index] == pytest.approx(motion.course[index], abs=1e-9)
 
@@ -56,7 +56,7 @@ def test_search_table_and_certificate_agree_on_bent_cycles(bend_problem):
     root = at_rest(problem)
     state, before = root.state, root.gait
     for gait, certified in zip(plan.gaits, plan.certificate.states):
-        told, _ = problem.motion.move_one(*state[:3], before, state[3], gait)
+        told = problem.motion.move(*state[:3], before, state[3]).pose[gait]
         cycle = problem.simulate(state, before, gait)
         assert np.hypot(*(cycle.state[:2] - certified[:2])) < 0.001
         assert np.hypot(*(told[-1, :2] - cycle.state[:2])) < 0.012
