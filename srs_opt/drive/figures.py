@@ -1,4 +1,4 @@
-"""Picture of the reachable motions: the differential drive at a glance."""
+"""Picture of the motions that the differential drive reaches."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The front door: optimize a gait for an objective, built in or of one's own."""
+"""One call: optimize a gait for an objective, built in or of one's own."""
 
 from __future__ import annotations
 

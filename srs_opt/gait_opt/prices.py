@@ -47,7 +47,7 @@ class Price:
 
 
 def prices(problem: CycleProblem, p: Program, solution: Solution, merit_unit: float) -> tuple[Price, ...]:
-    """Return the prices of the active limits at a solution, dearest first.
+    """Return the prices of the active limits at a solution, the costliest limit first.
 
     The solvers make minus the merit (in units of `merit_unit`) small, so a bound's multiplier (negative at a
     lower bound, positive at an upper one) times that unit is what the merit gains per unit of the bound.

@@ -16,7 +16,7 @@ from srs_opt.gait_opt.softness import robust_beside, speeds_at_stiffness
 from srs_opt.gait_opt.table import GaitTable
 from srs_opt.robot import Robot
 
-_PRICES_TOLD = 4  # the dearest limits; the JSON has all
+_PRICES_TOLD = 4  # the costliest limits; the JSON has all
 
 
 def wave_parameters(gait: Gait) -> tuple[list[float], list[float]] | None:

@@ -74,7 +74,7 @@ class GaitSearchSettings:
     ----------
     carried_starts : int
         Starts, the best by smoothed friction, that are carried to the robot's own. With one, a start that
-        is best only by smoothed friction wins; each costs the last, dearest stages.
+        is best only by smoothed friction wins; each costs the last stages, which take longest.
     same_optimum : float
         Merits closer than this are one optimum.
     exact_reach : float

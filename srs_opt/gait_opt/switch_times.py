@@ -33,8 +33,19 @@ _MOTION = ("speed", "turn_rate")
 
 @dataclass(frozen=True)
 class ExactSwitchTimes:
-    """The result: gait, its orbits and score, the robots' speeds by the last good solve, the steps,
-    what the limits cost there."""
+    """The result.
+
+    Attributes
+    ----------
+    gait : Gait
+    orbits : tuple of Orbit, one per robot
+    score : Score
+    claimed_m_s : tuple of float
+        The robots' speeds by the last solve that simulation confirmed.
+    steps : tuple of Step
+    prices : tuple of Price
+        What the active limits cost there.
+    """
 
     gait: Gait
     orbits: tuple[Orbit, ...]

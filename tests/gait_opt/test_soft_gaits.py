@@ -124,7 +124,7 @@ def test_orbits_that_rest_does_not_reach_are_noticed():
 
 
 def test_what_was_given_is_kept_where_no_better_gait_has_a_steady_motion(monkeypatch):
-    """As found at 0.0015 N m²: a hair beside a good gait the motion no longer repeats."""
+    """As found at 0.0015 N m²: a millisecond beside a good gait the motion no longer repeats."""
 
     def lost(*arguments):
         raise NoAnswerError("the motion does not repeat with the gait's period")

@@ -86,7 +86,7 @@ def test_images_are_mirror_images(table):
     left = {g.name: g for g in table.gaits if g.name.endswith(" left") and "back" not in g.name}
     for name, entry in left.items():
         other = table[name.replace("left", "right")]
-        if name.startswith("pivot"):  # on the spot, whether the path runs ahead or back depends on hairs
+        if name.startswith("pivot"):  # on the spot, rounding decides whether the path runs ahead
             assert abs(other.speed_m_s) == pytest.approx(abs(entry.speed_m_s), abs=1e-5)
             assert sorted(other.envelope_m) == pytest.approx(sorted(entry.envelope_m), abs=2e-3)
         else:
