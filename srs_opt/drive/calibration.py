@@ -45,6 +45,7 @@ class DriveCalibration:
 
     def motion(self, speed: float | np.ndarray, turn_rate: float | np.ndarray) -> tuple:  # type: ignore[type-arg]
         """Return calibrated speed and turn rate (speed over radius)."""
+        # turn rate = speed / radius, each with its own factor
         return speed * self.speed.value, turn_rate * self.speed.value / self.radius.value
 
     def inverse_motion(self, speed: float | np.ndarray, turn_rate: float | np.ndarray) -> tuple:  # type: ignore[type-arg]
@@ -61,6 +62,7 @@ class DriveCalibration:
         dx, dy, turn = displacement
         new_turn = turn * self.speed.value / self.radius.value
         chord = (
+            # a chord is 2 radius sin(turn/2)
             self.radius.value * math.sin(new_turn / 2) / math.sin(turn / 2)
             if abs(turn) > 1e-9
             else self.speed.value
@@ -90,9 +92,11 @@ def fit_factor(simulated: np.ndarray, measured: np.ndarray, sd: np.ndarray) -> F
     if not good.any():
         return Factor()
     ratio = np.log(measured[good] / simulated[good])
+    # a stated deviation of zero would outweigh all others: 0.01 % at least
     variance = np.maximum(np.nan_to_num(sd[good]) / measured[good], 1e-4) ** 2
     weight = 1 / variance
     mean = weight @ ratio / weight.sum()
+    # DerSimonian and Laird: Cochran's Q less its expectation, over what unit scatter adds to it
     excess = weight @ (ratio - mean) ** 2 - (ratio.size - 1)
     scale = weight.sum() - (weight**2).sum() / weight.sum()
     scatter2 = max(excess / scale, 0.0) if ratio.size > 1 else 0.0

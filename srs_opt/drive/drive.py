@@ -112,6 +112,7 @@ class Drive(Result):
     def reachable(self) -> shapely.Geometry:
         """Return the set of reachable (speed m/s, turn rate rad/s), forward, both sides."""
         triangles = shapely.polygons(self.corners[:, :, 4:6])
+        # the buffer closes slits that rounding leaves between neighbouring triangles
         left = shapely.union_all(shapely.buffer(triangles, 1e-9))
         return shapely.union(left, shapely.affinity.scale(left, 1, -1, origin=(0, 0)))
 
@@ -139,6 +140,7 @@ class Drive(Result):
                 f"{DRIVE_MAP.most_rad_s:g} rad/s, found {speed_m_s:g} m/s turning {turn_rate_rad_s:+g} rad/s"
             )
         reverse = speed_m_s < 0
+        # a reversed wave runs the same arc backwards: speed and turn rate change sign together
         speed, turn = abs(speed_m_s), turn_rate_rad_s * (-1 if reverse else 1)
         side = -1.0 if turn < 0 else 1.0
         found = self._triangle(speed, abs(turn))
@@ -152,6 +154,7 @@ class Drive(Result):
         jacobian = _jacobian(corners)
         slow_m_s = DRIVE_MAP.slow * self.robot.length_m
         for _ in range(DRIVE_MAP.refinements):
+            # seen in the triangle's quadrant, forwards and to the left, where its derivatives hold
             missing = (target - [best.speed_m_s, best.turn_rate_rad_s]) * [sign, sign * side]
             if self._size(missing) < DRIVE_MAP.tolerance * max(speed, slow_m_s):
                 break
@@ -202,8 +205,10 @@ class Drive(Result):
         wanted = np.array([speed, turn])
         area = _cross(b - a, c - a)
         with np.errstate(divide="ignore", invalid="ignore"):
+            # barycentric coordinates by ratios of areas; flat triangles give no number and are left out
             w1, w2 = _cross(wanted - a, c - a) / area, _cross(b - a, wanted - a) / area
         weights = np.stack([1 - w1 - w2, w1, w2], axis=1)
+        # a motion on an edge is inside both neighbours
         inside = (weights >= -1e-6).all(axis=1) & (np.abs(area) > 1e-12)
         if not inside.any():
             return None

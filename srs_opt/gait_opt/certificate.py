@@ -162,6 +162,7 @@ def certify(
     """
     orbits = tuple(steady_gait(r, gait, problem.model) for r in problem.robots)
     dwell = gait.shortest_dwell_s()
+    # dwells are differences of times: a nanosecond is rounding
     dwell_ok = dwell >= problem.limits.min_dwell_s - 1e-9
     common = []
     if not dwell_ok:
@@ -169,6 +170,7 @@ def certify(
     common += _ranges_left(problem.limits, gait)
     robots = tuple(_certified(problem, gait, r, o, claimed_m_s[r], settings) for r, o in enumerate(orbits))
     scores = robot_scores(problem, gait, orbits)
+    # robots with failures first, then by score
     worst = min(range(len(robots)), key=lambda r: (not robots[r].failures, scores[r].total))
     return Certificate(robots, worst, dwell_ok, gait.switches_per_s, tuple(common)), orbits
 
@@ -301,6 +303,7 @@ def self_clearance_m(robot: Robot, orbit: Orbit, model: str | None = None) -> fl
     apart = np.abs(along[:, None] - along[None]) > 1.6 * robot.body_width_m  # half a turn of its own width
     if not apart.any():
         return float("inf")
+    # every pair once
     i, j = np.nonzero(np.triu(apart))
     distance = np.hypot(x[i] - x[j], y[i] - y[j])
     return float(distance.min() - robot.body_width_m)

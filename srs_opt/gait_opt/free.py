@@ -220,6 +220,7 @@ def relax(problem: CycleProblem, gait: Gait) -> Relaxation:
     orbits = orbits_of(problem, gait, FREE_VALVES.friction_speed_m_s)
     z, scales = unknowns_from_orbits(p.layout, list(problem.robots), list(orbits), mesh)
     levels = slice(2, 2 + p.layout.switches)
+    # off the bounds, where an interior-point method has room
     z[levels] *= FREE_VALVES.first_level
     z[p.layout.merit] = score(problem, gait, orbits).merit
     unknowns, rows, _ = bounded(loose, p, z, 2.0)
@@ -262,6 +263,7 @@ def sum_up(levels: np.ndarray) -> np.ndarray:
     """Return the on/off sequence (True: +1) whose running sum follows that of `levels`."""
     owed, on = 0.0, np.zeros(levels.size, dtype=bool)
     for k, level in enumerate(levels):
+        # sum-up rounding: what is owed stays within one step, so the integral of the valve does
         owed += level
         on[k] = owed >= 0
         owed -= 1.0 if on[k] else -1.0
@@ -270,6 +272,7 @@ def sum_up(levels: np.ndarray) -> np.ndarray:
 
 def intervals_of(on: np.ndarray) -> list[tuple[float, float]]:
     """Return the cyclic on-intervals as (start, end) fractions of the cycle, starts in [0, 1)."""
+    # cyclic: the first place is compared with the last
     edges = np.flatnonzero(on != np.roll(on, 1))
     if not edges.size:
         return [(0.0, 0.5)]  # a valve that never switches: the wave's half cycle, for want of anything

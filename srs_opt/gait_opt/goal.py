@@ -194,6 +194,7 @@ def tick_counts(frequency_hz: tuple[float, float], tick_s: float) -> tuple[int, 
     Where no whole number lies strictly within, `GOAL.frequency_excess` of the limits is used up.
     """
     fewest, longest = 1 / frequency_hz[1] / tick_s, 1 / frequency_hz[0] / tick_s
+    # 1e-6: limits that are whole ticks but for rounding are within
     least, most = math.ceil(fewest - 1e-6), math.floor(longest + 1e-6)
     if least <= most:
         return least, most
@@ -215,4 +216,5 @@ def air_work_j(intervals: int, pressure_kpa: Any, volume_m3: Any) -> Any:
     `intervals` counts on-intervals of all segments; each begins with a fill on the left and ends with one
     on the right. Numbers or expressions, like pressure and volume.
     """
+    # two fills per on-interval, 1e3 Pa per kPa
     return 2e3 * intervals * volume_m3 * pressure_kpa

@@ -95,11 +95,13 @@ def _of_rows(
         return float(by_row[names == name].sum())
 
     found = [
+        # rows are length - dwell f >= 0, so 1 ms less dwell relaxes each by 1e-3 f
         ("the least time between switches", -1.0, "ms", -1e-3 * total("dwell") * float(solution.z[0])),
         ("the widest band", 1.0, "mm", -1e-3 * total("envelope") / ENVELOPE_UNIT_M),
     ]
     if problem.goal.radius_m is not None:
         turn = float(solution.z[p.layout.unknown(0, "turn_rate")])
+        # the row is speed - radius x turn rate = 0
         at = float(by_row[names == "radius"][0]) * turn
         found.append(("the wanted radius", float(np.sign(at)) * 10.0, "mm", 0.01 * abs(at)))
     found += [

@@ -76,6 +76,7 @@ def broken_constraints(problem: CycleProblem, rows: np.ndarray) -> list[tuple[st
     """Return name and excess of the objective's own constraints that do not hold."""
     own = problem.formulas
     over = np.maximum(np.maximum(own.low - rows, rows - own.high), 0.0)
+    # `not <=`: a constraint that is not a number is broken
     return [(name, float(v)) for name, v in zip(own.names, over) if not v <= 0.0]
 
 
@@ -92,6 +93,7 @@ def _miss(problem: CycleProblem, robot: int, orbit: Orbit) -> float:
     if goal.turn == "side":
         missed += lever * max(GOAL.least_turn_rad_s - goal.sense * turn, 0.0)
     elif goal.radius_m is not None:
+        # compared as turn rates, which stay finite for a straight path
         missed += lever * abs(turn - orbit.speed_m_s / goal.radius_m)
     elif goal.turn != "any":
         missed += lever * abs(turn - (goal.turn_rate_rad_s or 0.0))

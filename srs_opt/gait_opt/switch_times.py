@@ -119,10 +119,12 @@ def collocated_speeds(problem: CycleProblem, gait: Gait) -> tuple[float, ...] | 
     (low, high), (row_low, row_high) = problem.bounds(p)
     held = slice(0, 2 + p.layout.switches)
     free = [p.layout.unknown(r, name) for r in range(len(orbits)) for name in _MOTION]
+    # the gait is a constant here, the motion alone is solved for
     low[held] = high[held] = z[held]
     low[free], high[free] = -np.inf, np.inf
     wishes = slice(row_low.size - len(p.goal.names), None)
     merits = np.array(p.goal.names) == "merit"
+    # what is wanted of the gait is dropped; the merit's row stays, or the merit would be unbounded
     row_low[wishes], row_high[wishes] = np.where(merits, 0.0, -np.inf), np.inf
     rows = (row_low, row_high)
     solution = p.solve(z, parameters, (low, high), rows, options=_IPOPT, solver=problem.solver)
@@ -146,6 +148,7 @@ def _path_speeds(
         if abs(turn) * MOTION.straight_radius_m > abs(speed):
             states = z[p.layout.states(r)].reshape(p.layout.points, -1) * scales[r]
             ahead, aside = states[:, AHEAD], states[:, ASIDE]
+            # the centre of rotation lies speed/turn to the left of the mean place
             distance = float(weights @ np.hypot(ahead, aside - speed / turn))
             speed = float(np.copysign(abs(turn) * distance, speed))
         speeds.append(speed)

@@ -76,6 +76,7 @@ def searched_on_ticks(problem: CycleProblem, gait: Gait, rounded: Gait) -> Gait:
     the simulated score grows.
     """
     search = _Search(problem, max(math.ceil(problem.limits.min_dwell_s / problem.limits.tick_s - 1e-6), 1))
+    # keyed by the score: starts of equal score are searched once
     starts = {search.value(start): start for start in _starts(problem, gait, rounded)}
     found = [
         search.improved(starts[value], value)
@@ -116,6 +117,7 @@ class _Search:
                     tried.add(trial)
                     trials += 1
                     new = self.value(trial)
+                    # not-a-number is no gain either
                     if not new > value + TICK_SEARCH.gain:
                         break
                     best, value, improved = trial, new, True
@@ -132,6 +134,7 @@ def _starts(problem: CycleProblem, gait: Gait, rounded: Gait) -> Iterator[TickGa
     for period in periods:
         yield TickGait.of_gait(gait, period)
         yield TickGait.of_gait(rounded, period)
+        # both halves of an even wave are whole ticks only then
         if single and period % 2 == 0 and problem.goal.turn == "straight":
             yield TickGait.of_gait(symmetrized(gait), period)
 

@@ -46,6 +46,7 @@ class Schedule:
         }
         events: list[tuple[int, int]] = []
         for tick in sorted(switches):
+            # asked half a tick later: rounding at the switch itself must not decide
             states = gait.valve((tick + 0.5) * tick_s)
             mask = sum(segment_mask(i, int(s)) for i, s in enumerate(states))
             if not events or events[-1][1] != mask:

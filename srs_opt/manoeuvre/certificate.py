@@ -77,6 +77,7 @@ def certify(run: Integrator, task: Task, plan: ValvePlan) -> tuple[Certificate, 
     coarse = run.integrate(plan.timeline(), task.start.state, coarse_m_s)
     fine = run.integrate(plan.timeline(), task.start.state, coarse_m_s / MANOEUVRE_CERTIFICATE.finer)
     apart = (coarse.final[POSE] - fine.final[POSE]) * (1.0, 1.0, CONSTRAINT.lever * run.robot.length_m)
+    # the finer motion's own error is at most this share of the difference of the two
     error = float(np.hypot(*apart[:2]) + abs(apart[2])) / MANOEUVRE_CERTIFICATE.ratio
     shot = Shot(plan, fine.time_s, seen_states(run, fine))
     rows = RowMaker(run, task, inside=1.0)
@@ -92,6 +93,7 @@ def certify(run: Integrator, task: Task, plan: ValvePlan) -> tuple[Certificate, 
         end_ok=end >= error and error <= MANOEUVRE_CERTIFICATE.error * run.robot.length_m,
         space_ok=space >= error,
         curvature_ok=bounds.max_curvature_1_m is None or curvature <= bounds.max_curvature_1_m * (1 + 1e-6),
+        # times are sums: a nanosecond, or a millionth of a tick, is rounding
         dwell_ok=dwell >= bounds.dwell_s - 1e-9,
         tick_ok=plan.off_tick_s(bounds.tick_s) <= 1e-6 * bounds.tick_s + 1e-9,
         pressure_ok=low - 1e-9 <= plan.pressure_kpa <= high + 1e-9,

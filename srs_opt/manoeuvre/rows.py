@@ -36,6 +36,7 @@ class RowMaker:
         self.inside = CONSTRAINT.inside if inside is None else inside
         length = run.robot.length_m
         self.spare_m = CONSTRAINT.spare * length if self.inside < 1 else 0.0
+        # all rows are lengths, so that one penalty and one tolerance serve them all
         self.lever_m, self.bend_m2 = CONSTRAINT.lever * length, CONSTRAINT.bend * length * length
 
     def __call__(self, shot: Shot, radius_m: float = 0.0) -> Rows:
@@ -81,6 +82,7 @@ class RowMaker:
             rows.append(self._linear(shot, -1, weights, -abs(end.past_m) - self.spare_m))
         if end.turn_rad is not None:
             weights = np.zeros(self.run.states)
+            # the heading is unwrapped: a turn by more than half a circle counts as it is
             weights[2] = np.sign(end.turn_rad) * self.lever_m
             begun = float(weights @ self.task.start.state)
             rows.append(
@@ -124,6 +126,7 @@ class RowMaker:
                 centre = self.centre(points)
                 away = flat - centre
                 distance = np.hypot(*away.T)
+                # the circle's centre is held within a step and found anew for the next
                 by_unknowns = self._chain(-away / np.maximum(distance, 1e-9)[:, None], jacobian)
                 if by_unknowns.size:
                     by_unknowns[:, -1] = 1.0
@@ -170,6 +173,7 @@ class RowMaker:
         """Return the nodes at which the body is measured."""
         count = max(int(np.ceil(shot.time_s[-1] / CONSTRAINT.interval_s)), 2)
         wanted = np.linspace(0.0, shot.time_s[-1], count + 1)
+        # 1e-9: a node that rounding puts just before an instant serves it
         return np.unique(np.searchsorted(shot.time_s, wanted - 1e-9).clip(max=shot.time_s.size - 1))
 
     def points(self, shot: Shot, looked: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
@@ -195,6 +199,7 @@ def body_points(
     if moved is None:
         return points, None
     jacobian = np.repeat(moved[:, None, :2], line.shape[1], axis=1)
+    # d(point) = d(place) + d(heading) e_z x arm + R(heading) d(line)/d(kappa) d(kappa)
     arm = points - states[:, None, PLACE]
     turned = np.stack([-arm[..., 1], arm[..., 0]], axis=-1)
     jacobian = jacobian + turned[..., None] * moved[:, None, None, 2]

@@ -105,6 +105,7 @@ def shoot_with_sensitivity(
                 born.setdefault(node, []).append((column, jump))
             column += 1
     by_pressure = np.zeros((course.h_s.size, m))
+    # the last unknown is the pressure itself, in every step
     by_pressure[:, -1] = 1.0
     sensitivity = carried_on(run, course, states, born, by_pressure)
     # f at the end, from the last step itself: a finite difference would see the step's curvature
@@ -133,6 +134,7 @@ def carried_on(
     for node, jacobian in enumerate(jacobians):
         for column, jump in born.get(node, ()):
             sensitivity[node, :, column] += jump
+        # first what is born at the node, then the step that carries it on
         sensitivity[node + 1] = jacobian[:, :nx] @ sensitivity[node]
         sensitivity[node + 1] += jacobian[:, nx, None] * by_pressure[node]
     return sensitivity
@@ -141,6 +143,7 @@ def carried_on(
 def _jacobians(run: Integrator, course: Course, states: np.ndarray) -> np.ndarray:
     """Return every step's Jacobian by state and pressure (n, nx, nx + 1), LANES parts of the way at once."""
     nx, n = run.states, course.h_s.size
+    # all states are known already, so no part of the way has to wait for the one before
     cuts = np.unique(np.linspace(0, n, LANES + 1).astype(int))
     parts = [
         Course(np.append(states[a], np.zeros(nx * (nx + 1))), course.h_s[a:b], course.valve[a:b], course.p)
@@ -148,6 +151,7 @@ def _jacobians(run: Integrator, course: Course, states: np.ndarray) -> np.ndarra
     ]
     found, _ = jacobian_kernel(run.structure).run(parts)
     columns = [found[: part.h_s.size, nx:, lane] for lane, part in enumerate(parts)]
+    # by columns, as CasADi stacks matrices
     jacobian: np.ndarray = np.concatenate(columns).reshape(n, nx + 1, nx).transpose(0, 2, 1)
     return jacobian
 

@@ -93,6 +93,7 @@ class Solver:
             step = self._step(shot, reach)
             if step is None:
                 break
+            # fractions of the step guard against what the linear model does not see
             old = np.concatenate([best.plan.times(), [best.plan.duration_s, best.plan.pressure_kpa]])
             trials = [best.plan.with_times(*_split(old + f * step)) for f in MANOEUVRE_SOLVER.step_fractions]
             found = self.judge([t.trimmed() for t in trials])
@@ -133,6 +134,7 @@ class Solver:
         plan, task, bounds = shot.plan, self.task, self.task.bounds
         radius = self._radius(shot)
         rows = self.rows(shot, radius)
+        # rows with more to spare than a step can use up only make the linear program larger
         keep = rows.values < 1.5 * max(reach, 0.01) + 0.05
         rows = Rows(rows.values[keep], None if rows.jacobian is None else rows.jacobian[keep])
         assert rows.jacobian is not None
@@ -143,9 +145,11 @@ class Solver:
         cost[n + 1] = 0.02 * plan.fills / 50.0 if task.objective == "air" else 0.0
         cost[n + 2] = self.space_s_m if task.objective == "space" else 0.0
         cost[n + 3 :] = self.penalty_s_m
+        # values + J x + violation >= 0, written as A x <= b
         near = sparse.hstack([sparse.csr_matrix(-rows.jacobian), -sparse.identity(m)])
         dwell, room = self._dwell_rows(plan, size)
         low, high = np.full(size, -np.inf), np.full(size, np.inf)
+        # the trust region: linear models of sticking friction hold for milliseconds
         low[:n], high[:n] = -reach, reach
         low[n], high[n] = -4 * reach, 4 * reach
         if task.longest_s is not None:

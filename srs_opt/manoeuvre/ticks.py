@@ -22,6 +22,7 @@ def on_ticks(solver: Solver, plan: ValvePlan) -> Candidate:
     for _ in range(MANOEUVRE_SEARCH.tick_rounds):
         trials = [p for p in _neighbours(best.plan, tick) if solver.plays(p)]
         found = min(solver.judge(trials), key=lambda c: c.merit, default=best)
+        # gains of a microsecond are the integration's
         if found.merit >= best.merit - 1e-6:
             break
         best = found

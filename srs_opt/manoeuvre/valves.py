@@ -101,8 +101,10 @@ class ValvePlan:
         inner = np.sort(np.concatenate([self.times(), untils]))
         inner = inner[(inner > COINCIDENT_S) & (inner < self.duration_s - COINCIDENT_S)]
         if inner.size:
+            # switches that coincide but for rounding end one phase, not one of no length
             inner = inner[np.append(True, np.diff(inner) > COINCIDENT_S)]
         edges = np.array([0.0, *inner, self.duration_s])
+        # asked in the middle of a phase, where rounding of its edges does not matter
         middles = (edges[:-1] + edges[1:]) / 2
         valve = np.array([[row.at(t) for t in middles] for row in self.rows], dtype=float)
         pressures = np.array([kpa for _, kpa in self.early] + [self.pressure_kpa])

@@ -44,6 +44,7 @@ class Family:
     @property
     def spread(self) -> np.ndarray:
         """Standard deviations of a population's first generation."""
+        # CMA-ES takes no spread of zero: 1e-6 of it freezes a gene
         free = 1.0 if self.task.pressure_is_free else 1e-6
         timed = 1e-6 if passed(self.task) else 1.0
         rest = [
@@ -78,6 +79,7 @@ class Family:
         frequency = np.interp(
             share, np.linspace(0, 1, WAVE_POPULATION.knots), genes[: WAVE_POPULATION.knots]
         ).clip(*WAVE_POPULATION.limits_hz)
+        # the phase is the integral of the frequency, as omega t in (13)
         cycles = np.concatenate([[0.0], np.cumsum((frequency[1:] + frequency[:-1]) / 2 * np.diff(at))])
         lags, offsets = lag + (later_lag - lag) * share, offset + (later_offset - offset) * share
         rows = []
@@ -85,6 +87,7 @@ class Family:
             wave = np.sin(phase + 2 * math.pi * cycles + segment * lags) + offsets
             sign = np.where(wave >= 0, 1, -1)
             k = np.flatnonzero(sign[1:] != sign[:-1])
+            # a switch is where the wave passes zero, to second order in the instants' distance
             crossed = at[k] + (at[k + 1] - at[k]) * wave[k] / (wave[k] - wave[k + 1])
             states = (int(sign[0]), *(int(s) for s in sign[k + 1]))
             rows.append(ValveRow(states, tuple(float(t) for t in crossed)))
