@@ -79,6 +79,7 @@ def align(
         velocity = found.points(ends[0]) - found.points(ends[1])
         placed = found.points(points)
         by = np.stack([*_moves(placed), velocity / (2 * ALIGNMENT.difference_s)], axis=2)
+        # Gauss-Newton in the clock; the rigid part is solved exactly in every round
         step = np.linalg.lstsq(by[seen], (track - placed)[seen], rcond=None)[0][-1]
         moved = float(np.clip(later + step, -most_s, most_s))
         if abs(moved - later) < ALIGNMENT.settled_s:
@@ -100,6 +101,7 @@ def _rigid(track: np.ndarray, points: np.ndarray, later_s: float) -> Alignment:
     z, p = (np.ascontiguousarray(v).reshape(len(v), -1, 2) @ np.array([1, 1j]) for v in (track, points))
     seen = np.isfinite(z)
     z, p = z[seen], p[seen]
+    # in the complex plane the best rotation is the argument of sum z conj(p), both centred
     turn = float(np.angle(((z - z.mean()) * np.conj(p - p.mean())).sum()))
     shift = z.mean() - np.exp(1j * turn) * p.mean()
     return Alignment(later_s, turn, np.array([shift.real, shift.imag]))

@@ -94,6 +94,7 @@ def entry_sd(form: Form, fit: Fit) -> dict[str, float]:
         for i, key in enumerate(keys):
             change = ends[0][key] - ends[1][key]
             if form.direction is not None and key == form.direction.name:
+                # angles on either side of the cut differ by a whole turn
                 change = math.remainder(change, 2 * math.pi)
             jacobian[i, j] = change / (2 * h)
     variances = np.diag(jacobian @ fit.covariance[np.ix_(own, own)] @ jacobian.T)

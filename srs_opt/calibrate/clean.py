@@ -103,6 +103,7 @@ def outliers_of(points: Array, time_s: Array) -> np.ndarray:
     limit = CLEANING.outlier_sd * np.maximum(usual, _usual_nearby(size, CLEANING.neighbourhood * reach))
     some = np.arange(markers)
     for _ in range(CLEANING.passes):
+        # an outlier bends its neighbours' parabolas, too: only the worst nearby is sure
         found = (size >= _largest_nearby(size, reach)) & (size > limit[:, some])
         outlying[:, some] |= found
         again = found.any(axis=0)
@@ -148,9 +149,11 @@ def _off_parabola(points: Array, reach: int) -> tuple[Array, np.ndarray]:
         correlate1d(weight, (lag > 0) * 1.0, axis=0, mode="constant") >= 1
     )
     sure = seen & both_sides & (count >= 4)
+    # so that all can be inverted at once; these are not looked at
     normal[~sure] = np.eye(3)
     inverse = np.linalg.inv(normal)
     right = np.stack([summed(value, k) for k in range(3)], axis=-1)
     expected = np.einsum("tmk,tmck->tmc", inverse[..., 0, :], right)
+    # variance of a value less its prediction: its own noise and the parabola's at lag 0
     spread = np.sqrt(1 + np.maximum(inverse[..., 0, 0], 0.0))
     return np.where(sure[..., None], (value - expected) / spread[..., None], 0.0), sure

@@ -46,6 +46,7 @@ def coloured(noise: Noise, trials: Sequence[Trial], residuals: Sequence[np.ndarr
         white, walk, time = np.exp(log)
         return _deviance(Noise(white, walk, time), data)
 
+    # in logarithms, which keep all three positive
     simplex = start + np.vstack([np.zeros(3), np.diag(COLOURED_NOISE.first_steps)])
     options = {"xatol": 0.02, "fatol": 0.2, "maxfev": 120, "initial_simplex": simplex}
     best = minimize(of, start, method="Nelder-Mead", options=options)
@@ -86,6 +87,7 @@ def _distances(trial: Trial, residual: np.ndarray) -> _Distances | None:
 
 def _deviance(noise: Noise, data: Sequence[_Distances]) -> float:
     """Return -2 log restricted likelihood of the distances, each with twice a coordinate's variance."""
+    # a distance has the noise of both its ends
     root = np.sqrt(2)
     doubled = replace(noise, white_sd_m=root * noise.white_sd_m, correlated_sd_m=root * noise.correlated_sd_m)
     total = 0.0
@@ -96,6 +98,7 @@ def _deviance(noise: Noise, data: Sequence[_Distances]) -> float:
         columns = np.column_stack([np.nan_to_num(d.values).ravel(), np.repeat(d.free, channels, axis=0)])
         white = whiten(columns)
         total += whiten.log_det
+        # whitened values stand coordinate by coordinate where correlated, else frame by frame
         owner = np.nonzero(seen.T)[0] if noise.correlated_sd_m > 0 else np.nonzero(seen)[1]
         for k in range(channels):
             own = white[owner == k]

@@ -21,6 +21,7 @@ def contradicted(trial: Trial) -> str:
     time, turns = swing
     duration, entered = float(time[-1] - time[0]), trial.frequency_hz
     highest = min(ENTRY.frequencies_hz[1], 0.25 / float(np.median(np.diff(time))))
+    # steps of a quarter of what the duration resolves: no peak falls between them
     tried = np.arange(ENTRY.frequencies_hz[0], max(highest, 2 * entered), 0.25 / duration)
     power = np.array([_power(time, turns, f)[0] for f in tried])
     best = float(tried[int(np.argmax(power))])
@@ -30,6 +31,7 @@ def contradicted(trial: Trial) -> str:
         and own < ENTRY.least_power_share * power.max()
     ):
         return f"the body swings at {best:.2g} Hz, not at the {entered:.3g} Hz that are entered"
+    # joint i + 1 less joint i, the beta_i of (13)
     lags = np.angle(waves[1:] * np.conj(waves[:-1]))
     mean = np.angle(np.exp(1j * lags).sum())
     even = np.abs(np.angle(np.exp(1j * (lags - mean)))).max() < ENTRY.even_rad
@@ -53,6 +55,7 @@ def _swing(trial: Trial) -> tuple[np.ndarray, np.ndarray] | None:
     if time.size < ENTRY.least_frames or (time[-1] - time[0]) * trial.frequency_hz < ENTRY.least_cycles:
         return None
     chords = np.diff(markers[whole], axis=1) @ np.array([1, 1j])
+    # angles from chord to chord as arguments of complex ratios: no unwrapping
     turns = np.angle(chords[:, 1:] * np.conj(chords[:, :-1]))
     part = np.linspace(-1, 1, time.size)
     trend = np.column_stack([np.ones_like(part), part])

@@ -267,6 +267,7 @@ class _Descent:
             equations = self._measured(moved, stale=True)
             before, after = (self.point, self.equations), (moved, equations)
             moved = self._scatter_limited(before, after, inflation)
+            # under the inflation before the step: with its own a worse misfit could look like a gain
             gain = now - objective(self.coordinates, equations, moved, inflation)
         except NoAnswerError:
             gain = -math.inf

@@ -73,6 +73,7 @@ def _instrument_readings(
         if effect.link_force and effect.knows_the_room and not effect.of_tether:
             fx, fy = effect.link_force(e, state)
             tilt = tilt + ca.vertcat(fx[0], fy[0]) / (m.mass[0] * parameters["gravity_m_s2"])
+    # 1e-24 keeps the root differentiable on a level floor
     sine = ca.sqrt(ca.sumsqr(tilt) + 1e-24)
     assert isinstance(m, CompliantModel)
     scene = Scene(

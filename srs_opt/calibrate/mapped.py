@@ -30,6 +30,7 @@ def evaluate(function: ca.Function, moving: tuple[np.ndarray, ...], *fixed: np.n
     for k in range(0, n, MAP):
         count = min(MAP, n - k)
         for argument, value in zip(call.arguments, moving):
+            # columns beyond hold values of an earlier call, whose results nobody reads
             argument[:count] = value[k : k + count]
         call.evaluate()
         for whole, part in zip(out, call.results):

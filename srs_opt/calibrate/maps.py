@@ -163,6 +163,7 @@ def path(
     jacobian = np.empty((2, len(moves)))
     for k, move in enumerate(moves):
         by_speed, by_turn = sum((by[n] * d for n, d in move.items()), np.zeros(2))
+        # curvature = turn rate / speed: the quotient rule; forwards is what maps hold
         jacobian[:, k] = forward * by_speed, (by_turn - turn / speed * forward * by_speed) / speed
     return np.array([speed, turn / speed]), jacobian
 
@@ -196,6 +197,7 @@ def _own_variance(
     """
     excess: list[list[float]] = [[], []]
     for k, row in rows.items():
+        # sd of 1/r to first order: sd(r) / r^2
         stated = (row.speed_sd_m_s, (row.radius_sd_m or 0.0) / row.radius_m**2 if row.radius_m else 0.0)
         for i, sd in enumerate(stated):
             if sd > 0:
@@ -207,6 +209,7 @@ def _own_variance(
 
 def _root(row: MapRow, scatter: np.ndarray, own: np.ndarray, length_m: float) -> np.ndarray:
     """Return the Cholesky factor of a row's covariance: that of one run over the number of replicates."""
+    # the mean over replicates, each with its own friction and curvature
     covariance = (scatter @ scatter.T + np.diag(own)) / max(row.replicates, 1)
     if row.radius_m is None:
         covariance[1, 1] += (MAP_DATA.straight_curvature_sd / length_m) ** 2

@@ -252,6 +252,7 @@ def _functions(
                 robot[_FOLDED["gap_extra"]] += effect.gap_extra(e)
             if effect.flexibility:
                 stiffness = robot[_FOLDED["flexibility"]]
+                # springs in series: 1/EI' = 1/EI + flexibility
                 robot[_FOLDED["flexibility"]] = stiffness / (1 + stiffness * effect.flexibility(e))
             if effect.relaxation:
                 own_time = robot[_FOLDED["relaxation"]]

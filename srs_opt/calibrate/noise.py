@@ -84,6 +84,7 @@ def _white_sd_m(dataset: DataSet) -> float:
     # sum of squared binomial coefficients: the variance of fourth differences of white noise over its own, 70
     gain = np.sqrt(comb(2 * ORDER, ORDER))
     size = np.abs(pooled)
+    # by the median first: jumps must not widen the window that leaves them out
     usual = np.median(size) / MAD
     sd = float(np.sqrt(np.mean(size[size <= WHITE_NOISE.jump_sd * usual] ** 2)) / gain)
     return sd if sd > 0 else dataset.marker_sd_m

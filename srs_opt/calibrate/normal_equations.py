@@ -72,8 +72,10 @@ class NormalEquations:
         index = np.array(self.scattered, dtype=int)
         precision = self.scatter_sd**-2.0
         whole = self.raw / inflation
+        # precision of the scatter given everything else: data and prior
         inner = whole[np.ix_(index, index)] + np.diag(precision)
         cross = whole[index].copy()
+        # the prior pulls the scatter back to zero from where it stands
         cross[:, -1] -= self.scatter_now * precision
         # Gaussian integral over b: log det (I + P Z'Z/sd^2), so that deviances of different models compare
         log_det = float(np.linalg.slogdet(inner)[1] - np.sum(np.log(precision)))
@@ -98,6 +100,7 @@ class NormalEquations:
 
     def after(self, step: np.ndarray, moved: np.ndarray, inflation: float = 1.0) -> float:
         """Return the deviance that the linearisation promises after a step (K,), the scatter moved (B,)."""
+        # the residual after a step is r - Y step, so [Y r] (step, -1) is minus that
         both = np.append(step, -1.0)
         both[list(self.scattered)] += moved
         scatter = (self.scatter_now + moved) / self.scatter_sd
@@ -199,7 +202,9 @@ def trial_normal_equations(
         )
         left = left - both[:, size:] @ (scale * back[:, -1])
         raw = raw[:size, :size] - (scale[:, None] * raw[size:, :size]).T @ back
+        # rounding leaves it not quite symmetric, which eigenvalue methods resent
         raw = (raw + raw.T) / 2
+    # an unknown without a prior uses up one value (restricted likelihood)
     count = both.shape[0] - (0 if own_sd is None else int(np.sum(np.isinf(own_sd))))
     serial = serial_correlation(whiten.in_place(left))
     return NormalEquations(raw, count, tuple(scattered), scatter_sd, scatter_now, serial)
@@ -240,6 +245,7 @@ def solve(total: np.ndarray, chosen: Sequence[int], precision: np.ndarray, offse
     inverse = np.linalg.pinv(a * scale[:, None] * scale, rcond=OBJECTIVE.least_eigenvalue, hermitian=True)
     inverse *= scale[:, None] * scale
     step = inverse @ g
+    # the quadratic at its minimum, c - g' A^-1 g
     deviance = float(total[-1, -1] + np.sum(precision * offset**2) - g @ step)
     return Solution(step, inverse, deviance)
 
@@ -278,6 +284,7 @@ def bounded_solve(
     covariance = np.zeros((len(chosen), len(chosen)))
     inside = np.flatnonzero(found.active_mask == 0)
     covariance[np.ix_(inside, inside)] = solve(total, free, precision, offset).covariance
+    # at the bound exactly, not a rounding error beyond it
     step = np.maximum(found.x * scale, bound)
     deviance = float(total[-1, -1] + np.sum(precision * offset**2) - 2 * g @ step + step @ a @ step)
     return Solution(step, covariance, deviance)

@@ -16,6 +16,7 @@ from srs_opt.calibrate.normal_equations import NormalEquations, Solution, bounde
 
 def priors(coordinates: Sequence[Coordinate], point: Point) -> tuple[np.ndarray, np.ndarray]:
     """Return precision and offset of the priors at `point`."""
+    # a free coordinate has no prior: precision 0
     precision = np.array([0.0 if np.isinf(c.prior_sd) else c.prior_sd**-2 for c in coordinates])
     offset = np.array([point.values.get(c.name, c.start) - c.start for c in coordinates])
     return precision, offset
@@ -103,16 +104,19 @@ def best_move(
         parts = {n: g.eliminated(inflation, held.get(n), damping) for n, g in equations.items()}
         step = _solved(coordinates, [e.matrix for e in parts.values()], point, damping).step
         for k, c in enumerate(coordinates):
+            # logarithms: a long step would change a value by orders of magnitude
             if not c.effect or c.log:
                 step[k] = np.clip(step[k], -longest, longest)
         free = {n: e.back[:, -1] - e.back[:, :-1] @ step for n, e in parts.items()}
         scatter = {n: _within(equations[n], b) for n, b in free.items()}
         now = {n: _held(equations[n], b, free[n], step, inflation) for n, b in scatter.items()}
+        # until the set of held scatters settles (an active-set iteration); NaN means free
         if all(np.array_equal(np.isnan(b), np.isnan(held.get(n, np.nan * b))) for n, b in now.items()):
             break
         held = now
     precision, offset = priors(coordinates, point)
     promised = sum(parts[n].at_point - g.after(step, scatter[n], inflation) for n, g in equations.items())
+    # what the priors of the shared coordinates gain or lose
     promised += float(precision @ (offset**2 - (offset + step) ** 2))
     return Move(step, scatter, promised)
 
@@ -195,6 +199,7 @@ def _solved(
     total = np.sum(matrices, axis=0)
     if damping:
         own = np.arange(len(coordinates))
+        # Marquardt: relative to the diagonal, whatever the coordinates' units
         total[own, own] += damping * (total[own, own] + precision)
     return bounded_solve(total, range(len(coordinates)), precision, offset, lower - now)
 
@@ -222,6 +227,7 @@ def projected(
     """
     inner = total[:fitted, :fitted] + np.diag(precision[:fitted])
     inverse = np.linalg.pinv(inner, rcond=rank, hermitian=True)
+    # Schur complement: what the others tell that the fitted cannot imitate
     cross = total[:fitted, fitted:]
     return inverse, total[fitted:, fitted:] - cross.T @ inverse @ cross
 

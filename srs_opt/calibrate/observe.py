@@ -164,7 +164,9 @@ def _at_once(
     centre_only: bool,
 ) -> Prediction:
     """Return what the camera sees of all markers at the trial's labels."""
+    # when a frame was really taken
     at = trial.time_s * (1 + nodes.clock_rate) + nodes.clock_s
+    # with the rates at the nodes interpolation is of fourth order, as the steps are
     rate = _pose_rate(model, nodes, values)
     pose = hermite(nodes.time_s, nodes.body[:, :3], rate, at)
     structure, kept = model.structure(values, coordinates)
@@ -192,6 +194,7 @@ def _at_once(
         part = jac_pose @ linear(nodes.time_s, varied.pose, at)
         part += jac_shape @ linear(nodes.time_s, varied.shape, at)
         jac_p = by_p.reshape(frames, -1, seen).transpose(0, 2, 1)
+        # parameters that are lengths move points of the picture directly, beside the motion
         touched = np.any(seeds != 0, axis=1) & np.any(by_p.reshape(frames, -1, seen) != 0, axis=(0, 2))
         part += jac_p[:, :, touched] @ seeds[touched][:, moving]
         jacobian[:, :, moving] = part
@@ -253,6 +256,7 @@ def _velocity(
     nodes: Nodes, layout: StateLayout, rate: np.ndarray, at: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the rates of pose and shape at the frames; none before the start."""
+    # before time 0 the robot stands, whatever the clock says
     moving = (at >= 0)[:, None]
     return (
         np.asarray(linear(nodes.time_s, rate, at) * moving),

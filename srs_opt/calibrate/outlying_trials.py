@@ -25,6 +25,7 @@ def own_scatter(experiment: Experiment, fit: Fit, trials: Sequence[Trial]) -> Po
         moved, settled = {}, True
         for trial in trials:
             normal = equations[trial.name]
+            # the trial's own variance inflation, as in `variance_inflation_of`
             excess = normal.misfit / normal.count - 1 - OBJECTIVE.inflation_sd * np.sqrt(2 / normal.count)
             back = normal.eliminated(1 + OBJECTIVE.correlated_values * max(0.0, excess)).back
             now = point.scatter.get(trial.name, np.zeros(back.shape[0]))

@@ -149,6 +149,7 @@ def unidentifiable(coordinates: list[Coordinate], covariance: np.ndarray) -> tup
     Directions are the eigenvectors of the posterior covariance in units of the priors.
     """
     prior = np.array([c.prior_sd for c in coordinates])
+    # eigenvalue 1: the data say nothing there
     values, vectors = np.linalg.eigh(covariance / prior[:, None] / prior)
     found = []
     for value, vector in zip(values, vectors.T):

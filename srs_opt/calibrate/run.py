@@ -69,6 +69,7 @@ def calibrate(
         tell(f"noise: {noise.in_words}")
         experiment = experiment.with_noise(noise)
         start_ratio = found.start_misfit_ratio
+        # from where the first fit ended, but reported against where that one began
         found = replace(fit(experiment, base, found.point, report=tell), start_misfit_ratio=start_ratio)
     before = math.sqrt(found.start_misfit_ratio)
     experiment, found, odd = _without_odd(experiment, found)

@@ -31,6 +31,7 @@ def smooth_terms(
     markers = coordinates // 2
     if noise.drift_m > 0:
         part = np.linspace(0, 1, frames)
+        # from 0 to 1, and a parabola of height 1 that leaves the ends where they are
         for way, share in ((part, 1.0), (4 * part * (1 - part), 0.25)):
             columns += [_shift(way, np.broadcast_to(np.eye(2)[k], (frames, 2)), markers) for k in range(2)]
             sd += [share * noise.drift_m] * 2

@@ -97,6 +97,7 @@ def _deviance(
         log_det += more + parts.log_det
     every = range(len(free))
     a = total[:-1, :-1] + np.diag(precision)
+    # scaled to unit diagonal, so that the determinant does not overflow; the scale is taken off again
     scale = 1 / np.sqrt(np.maximum(np.diag(a), 1e-300))
     log_det += float(np.linalg.slogdet(a * scale[:, None] * scale)[1] - 2 * np.log(scale).sum())
     return solve(total, every, precision, offset).deviance, log_det

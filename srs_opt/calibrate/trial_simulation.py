@@ -119,6 +119,7 @@ def tolerance_for(values: int, sd_m: float) -> float:
 
     An error of the track counts as its square, over the noise's, times the number of values.
     """
+    # the default serves 15,000 values with 1 mm of noise; what shows grows with the root of their number
     needed = TRIAL.tolerance_m_s * (sd_m / 0.001) * math.sqrt(15_000 / max(values, 1))
     return min(TRIAL.tolerance_m_s, max(TRIAL.finest_m_s, needed))
 
@@ -146,6 +147,7 @@ def _applied(applied: Applied, end_s: float, trial: Trial) -> Timeline:
     """
     within = applied.time_s < end_s - 1e-9
     durations = np.diff(np.append(applied.time_s[within], end_s))
+    # S in (13) times the pressure is all that (15) knows
     share = applied.pressure_kpa[within] / trial.pressure_kpa if trial.pressure_kpa > 0 else 0.0
     valve = (applied.state[within] * np.reshape(share, (-1, 1))).T
     return Timeline.constant(durations, valve, trial.pressure_kpa, trial.frequency_hz or 1.0)
@@ -159,6 +161,7 @@ def _scheduled(schedule: Schedule, segments: int, end_s: float, trial: Trial) ->
     starts = (np.arange(math.ceil(end_s / period))[:, None] * period + cycle).ravel()
     starts = starts[starts < end_s - 1e-9]
     durations = np.diff(np.append(starts, end_s))
+    # asked in the middle of a phase, where rounding of its edges does not matter
     middles = starts + durations / 2
     valve = np.stack([schedule.state(i, middles) for i in range(1, segments + 1)])
     frequency = trial.frequency_hz if trial.frequency_hz > 0 else 1 / period

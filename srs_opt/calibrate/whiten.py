@@ -36,6 +36,7 @@ class Whitening:
         channel, frame = np.nonzero(seen.T)
         self._rows = frame * seen.shape[1] + channel
         first = np.append(True, channel[1:] != channel[:-1])
+        # where the next coordinate begins the difference is negative and not used: `keep` is 0 there
         lag = np.abs(np.diff(time_s[frame], prepend=0.0))
         # a = exp(-dt/tau), 0 at a coordinate's first value; var(u_i) = walk (1 - a^2) + white (1 + a^2), the
         # latter from both values, and cov(u_i, u_(i-1)) = -white a
@@ -55,6 +56,7 @@ class Whitening:
     def log_det(self) -> float:
         """Log determinant of the covariance."""
         if self._correlated:
+            # taking differences has determinant 1: only the Cholesky factor counts
             return float(2 * np.log(self._factor[0]).sum())
         return float(2 * self._rows.size * np.log(self.sd_m))
 
