@@ -117,6 +117,7 @@ def weighted_mean(values: Array, sds: Array) -> Mean:
     excess = 0.0
     if spare:
         chi2 = float((precision * (values - centre) ** 2).sum())
+        # Cochran's Q less its expectation, over what unit scatter adds to it
         excess = max(0.0, (chi2 - spare) / float(total - (precision**2).sum() / total))
     weights = 1 / (np.asarray(sds) ** 2 + excess)
     value = float((weights * values).sum() / weights.sum())
@@ -125,6 +126,7 @@ def weighted_mean(values: Array, sds: Array) -> Mean:
 
 def _curvature(condition: str, fits: list[StepFit]) -> CurvatureOverPressure:
     pressure = np.array([f.pressure_kpa for f in fits])
+    # C_0 of (14) is proportional to pressure in the model: one slope per test
     slopes = np.array([abs(f.c0_1_m) for f in fits]) / pressure
     sds = np.array([f.c0_sd_1_m for f in fits]) / pressure
     p_value = None

@@ -53,6 +53,7 @@ def read_applied(
         return None
     left, right = rest[:, 0::2], rest[:, 1::2]
     supply = np.maximum(left, right).max(axis=1)
+    # S is the difference of the antagonistic chambers over the supply; nothing where nothing is supplied
     share = np.divide(left - right, supply[:, None], out=np.zeros_like(left), where=supply[:, None] > 0)
     return Applied(time_s, share, supply)
 

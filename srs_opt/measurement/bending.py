@@ -108,6 +108,7 @@ def fit_bending(tests: Sequence[StepTest], robot: Robot) -> BendingFit | None:
     known = np.array([mean, spread, 1.0, *(p.amplitude_1_m for p in pairs)])
     friction_sd = robot.relative_sd.get("friction_normal", 0.0)
     sds = np.array([mean_sd, mean_sd / mean, friction_sd, *(p.amplitude_sd_1_m for p in pairs)])
+    # a deviation of zero would divide by zero in the prior's rows
     sds = np.maximum(sds, 1e-6 * np.maximum(np.abs(known), 1e-3))
     return _fit(_Problem(robot, pairs, known, sds))
 
@@ -160,6 +161,7 @@ class _Problem:
         )
         wanted, places = [], []
         for k in range(count):
+            # a test depends on what all share and on its own amplitude, on no other's
             for i in (0, 1, 2, 3, 4 + k):
                 for end in ends:
                     moved = here.copy()
@@ -231,6 +233,7 @@ def _fit(problem: _Problem) -> BendingFit:
     jacobian = problem.jacobian(flexibility, nuisance)
     readings = residual.size - nuisance.size
     misfit = cost / max(readings - 1, 1)
+    # widened where the residuals are larger than the noise, never narrowed
     sd = float(np.sqrt(np.linalg.inv(jacobian.T @ jacobian)[0, 0] * max(misfit, 1.0)))
     alike, scales = _scaled(problem)
     scaled = scales if alike < cost - BENDING.scaled_gain else None

@@ -111,11 +111,13 @@ def position_jacobian(chain: Chain, q: Array) -> Array:
         + arc[..., None] * ((heading_derivatives[:-1] + heading_derivatives[1:]) / 2)[:, None, :]
     )  # (..., N - 1, 2, N - 1): d step_i / d kappa_j
     own = np.arange(n - 1)
+    # its own curvature also shortens the chord: d(l S(l kappa/2))/d kappa = l^2/2 S'
     steps[..., own, :, own] += np.moveaxis((l * l / 2 * derivative)[..., None] * unit_vectors(middle), -2, 0)
     tail = np.zeros((*steps.shape[:-3], 1, 2, n - 1))
     relative = np.concatenate([tail, np.cumsum(steps, axis=-3)], axis=-3)
     out = np.empty((*q.shape[:-1], n, 2, n + 2))
     out[..., :2] = np.eye(2)
+    # turning about the centre of mass
     out[..., 2] = quarter_turn(link_positions(chain, q) - q[..., None, :2])
     out[..., 3:] = relative - relative.mean(axis=-3, keepdims=True)
     return out

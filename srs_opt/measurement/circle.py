@@ -51,6 +51,7 @@ def fit_circle(points_m: Array) -> Circle:
     from scipy.optimize import least_squares
 
     middle = points.mean(axis=0)
+    # centred and of unit size: squares of coordinates far from the origin would cancel
     scale = float(np.sqrt(((points - middle) ** 2).sum(axis=1).mean())) or 1.0
     unit = (points - middle) / scale
 
@@ -62,9 +63,11 @@ def fit_circle(points_m: Array) -> Circle:
     a, b, radius = fit.x
     if not fit.success or not np.isfinite(fit.x).all() or radius > 1e4:
         raise NoAnswerError("the points lie on a straight line: no circle fits them")
+    # least_squares' cost is half the sum of squares
     variance = 2 * fit.cost / (len(unit) - 3)
     covariance = np.linalg.pinv(fit.jac.T @ fit.jac) * variance
     angle = np.unwrap(np.arctan2(unit[:, 1] - b, unit[:, 0] - a))
+    # the trend of the angle tells the sense of turning, whatever single steps do
     turn = float(np.polyfit(np.arange(len(angle)), angle, 1)[0])
     return Circle(
         centre_m=(float(a * scale + middle[0]), float(b * scale + middle[1])),

@@ -80,6 +80,7 @@ def _by_phase(time_s: Array, tracks: Array, frequency_hz: float, lag_rad: float)
         (a, b, mean), left = np.linalg.lstsq(basis, bend[seen], rcond=None)[:2]
         if left.size and left[0] > DIRECTION.most_left * float(((bend[seen] - mean) ** 2).sum()):
             return None  # not the frequency of these bends
+        # a sin(wt) + b cos(wt): the argument is the phase
         waves.append(complex(a, b))
     steps = [w * np.conj(v) for v, w in pairwise(waves)]
     size = sum(abs(step) for step in steps)
@@ -88,6 +89,7 @@ def _by_phase(time_s: Array, tracks: Array, frequency_hz: float, lag_rad: float)
     mean = sum(steps).imag / size
     if abs(mean) < DIRECTION.least_lag * abs(math.sin(lag_rad)):
         return None
+    # (13): beta grows by the lag from tail to head; a chain along which it falls is listed from the head
     return bool(mean * math.sin(lag_rad) < 0)
 
 
@@ -101,4 +103,5 @@ def _by_travel(chain: Chain, tracks: Array, lag_rad: float) -> bool | None:
     along = float(travel @ axis) / max(float(np.linalg.norm(axis)), 1e-9)
     if abs(along) < chain.pitch_m:
         return None
+    # with a positive lag the wave runs from head to tail and drives the robot head first
     return along * (-1.0 if lag_rad < 0 else 1.0) < 0

@@ -46,6 +46,7 @@ def ground_axes(points_m: Array, up: str = "auto") -> tuple[Array, Array]:
     if abs(normal[nearest]) > np.cos(np.radians(IMPORT.snap_deg)):
         normal = np.eye(3)[nearest]
     side = next(axis for axis in (1, 2, 0) if abs(normal[axis]) > 0.1)
+    # a plane's normal has no sign of its own: up is +Y, else +Z, else +X
     normal = normal * np.sign(normal[side])
     return _plane(normal), normal
 
@@ -56,6 +57,7 @@ def _thinnest(points: Array) -> Array:
     normal = min([*np.eye(3), axes[2]], key=lambda n: _spread(points @ n))
     for _ in range(10):
         height = points @ normal
+        # the 1e-9 lets exact planes keep their positions
         near = np.abs(height - np.median(height)) <= 3 * max(_spread(height), 1e-9)
         _, _, axes = np.linalg.svd(points[near] - points[near].mean(axis=0), full_matrices=False)
         if abs(axes[2] @ normal) > 1 - 1e-12:

@@ -220,6 +220,7 @@ def import_trial(
     values = [row.number(name, report, 0.0) for name in SETTINGS]
     if schedule is not None:
         values[0] = 1 / schedule.period_s
+    # the frequency first: head and tail are told by phases at it, the valves' start by the wave
     gait = _seen_gait(
         ValveWave(values[0], values[1], values[2], values[3], schedule), source.time_s, tracks, warnings
     )

@@ -97,6 +97,7 @@ def trial_motion(
             "or more"
         )
     harmonics = STEADY.harmonics if harmonics is None else harmonics
+    # four samples per shortest wave at least
     harmonics = max(1, min(harmonics, int(period / float(np.median(np.diff(time))) / 4)))
     end = float(time[-1])
     cycles, settled = _settled_cycles(time, tracks, period, whole, harmonics, marker_sd_m)
@@ -203,6 +204,7 @@ def _radius(
         return Interval(value, None, None, None)
     if bend.low <= 0 <= bend.high:
         return Interval(value, bend.sd * value**2, None, None)
+    # sd(1/k) = sd(k)/k^2 to first order; the interval's ends are inverted themselves
     return Interval(value, bend.sd * value**2, *sorted((1 / bend.low, 1 / bend.high)))
 
 

@@ -168,11 +168,13 @@ def _fitted(
     bounds = ([low, least, least], [high, most, most])
     fits = [
         least_squares(gaps, [grid[k], 1.0, 1.0], bounds=bounds, x_scale=[0.01, 0.1, 0.1], diff_step=1e-5)
+        # the best start and the fourth best: the grid's neighbours lead to the same minimum
         for k in np.argsort(costs)[:6:3]
     ]
     fit = min(fits, key=lambda f: float(f.cost))
     still = _shape_gaps(chain, np.zeros((len(time), chain.links - 1)), z)
     left = float(np.sqrt(2 * fit.cost / max(float(still @ still), 1e-30)))
+    # every frame has a turn and a shift of its own
     variance = 2 * fit.cost / max(len(fit.fun) - 3 * len(time) - 3, 1)
     covariance = np.linalg.pinv(fit.jac.T @ fit.jac) * variance * _correlated(fit.fun, len(time))
     edge = bool(min(fit.x[0] - low, high - fit.x[0]) < 1e-6)
@@ -197,6 +199,7 @@ def _shape_gaps(chain: Chain, kappa: Array, z: NDArray[np.complex128]) -> Array:
     m = np.where(seen, model[..., 0] + 1j * model[..., 1], 0.0)
     z = np.where(seen, z - z.sum(axis=1, keepdims=True) / count, 0.0)
     m = np.where(seen, m - m.sum(axis=1, keepdims=True) / count, 0.0)
+    # in the complex plane the best rotation is the argument of this sum
     turn = (np.conj(m) * z).sum(axis=1, keepdims=True)
     gap = z - np.exp(1j * np.angle(turn)) * m
     return np.concatenate([gap.real.ravel(), gap.imag.ravel()])

@@ -62,6 +62,7 @@ def likely_start_s(
             misfits.append(math.inf)
             continue
         spread = np.sqrt(sd**2 + (RUN_IN.model_share * (1 - expected)) ** 2)
+        # -2 log likelihood with its normalization, because the candidates' spreads differ
         misfits.append(float(np.sum(((seen - expected) / spread) ** 2 + 2 * np.log(spread))))
     best = int(np.argmin(misfits))
     return float(starts_s[best if misfits[0] - misfits[best] > RUN_IN.evidence else 0])

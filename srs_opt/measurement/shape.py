@@ -110,6 +110,7 @@ def shape_from_markers(
     information, _ = _normal_equations(chain, points, marker_sd_m, q)
     covariance: Array = np.linalg.inv(information + np.diag(prior)).astype(float)
     spread = np.linalg.eigvalsh(covariance[:, 3:, 3:])[:, -1] / prior_sd_1_m**2
+    # the markers' part of the cost alone
     misfit = cost - (q**2 * prior).sum(axis=1)
     told = spread < SHAPE.undetermined_share
     return Shape(q[:, :2], q[:, 2], q[:, 3:], covariance, misfit, told, float(prior_sd_1_m))
@@ -145,6 +146,7 @@ def _levenberg_marquardt(
         matrix, gradient = _normal_equations(chain, points[active], sd, q[active])
         matrix = matrix + np.diag(prior)
         gradient = gradient - q[active] * prior
+        # Marquardt: relative to the diagonal, as lengths, angles and curvatures stand side by side
         scale = np.diagonal(matrix, axis1=1, axis2=2) * damping[active, None]
         step = np.linalg.solve(matrix + scale[..., None] * np.eye(len(prior)), gradient[..., None])[..., 0]
         trial = q[active] + step
@@ -153,6 +155,7 @@ def _levenberg_marquardt(
         gain = cost[active] - new
         q[active[better]], cost[active[better]] = trial[better], new[better]
         damping[active] *= np.where(better, 0.1, 10.0)
+        # frames that have settled, or cannot, take no further part
         active = active[~(better & (gain < SHAPE.least_gain)) & (damping[active] < 1e8)]
         if not len(active):
             break
@@ -169,6 +172,7 @@ def first_guess(chain: Chain, points: Array) -> Array:
     chords = np.diff(filled, axis=1)
     direction = np.unwrap(np.arctan2(chords[..., 1], chords[..., 0]), axis=1)
     turned = _turned(chain, along)
+    # the pseudo-inverse gives the least squares' solution of least curvature
     curvature = np.diff(direction, axis=1) @ np.linalg.pinv(np.diff(turned, axis=0)).T
     tail = (direction - curvature @ turned.T).mean(axis=1)
     q = np.column_stack([np.zeros((len(filled), 2)), np.zeros(len(filled)), curvature])
@@ -179,6 +183,7 @@ def first_guess(chain: Chain, points: Array) -> Array:
 
 def _on_centre_line(chain: Chain, filled: Array) -> tuple[Array, Array]:
     """Return the means of markers at one place along the robot, in order, and the places, m from the tail."""
+    # to 0.1 mm: markers on both sides of one place are one place
     along = np.round(chain.straight_m[:, 0], 4)
     places = np.unique(along)
     means = np.stack([filled[:, along == place].mean(axis=1) for place in places], axis=1)

@@ -147,9 +147,11 @@ def likeliest_intensity(problem: _Problem) -> Intensity:
         z, (diagonal, coupling) = _most_probable(
             part, spread, state["z"], iterations=SMOOTHER.tuning_iterations
         )
+        # a warm start for the next intensities, which are near
         state["z"] = z
         factor = _banded_cholesky(diagonal, coupling)
         log_det = 2 * np.log(factor[0]).sum()
+        # log det of the prior's precision, as it depends on the intensities: spread^-2 per step and component
         prior_log_det = -2 * (len(z) - 1) * np.log(spread).sum()
         return float(_objective(part, spread, z) + log_det - prior_log_det) / 2
 
@@ -185,6 +187,7 @@ def _objective(problem: _Problem, spread: Array, z: Array) -> float:
     """Return minus twice the log posterior, up to a constant."""
     mean, precision = _first_prior(problem)
     step, a, b = _transition_gap(problem, z)
+    # w' W w with W the inverse covariance of an integrated Wiener process, see `_prior_blocks`
     process = ((12 / step**3) * a**2 - (12 / step**2) * a * b + (4 / step) * b**2) / spread
     misfit = residuals(problem.chain, problem.points, z[:, : problem.chain.unknowns])
     return float((misfit**2).sum() / problem.sd**2 + process.sum() + ((z[0] - mean) ** 2 * precision).sum())
@@ -283,6 +286,7 @@ def _solve(diagonal: Array, coupling: Array, gradient: Array, damping: float) ->
 
     size = diagonal.shape[1]
     damped = diagonal.copy()
+    # Levenberg-Marquardt, relative to the diagonal
     damped[:, np.arange(size), np.arange(size)] *= 1 + damping
     factor = _banded_cholesky(damped, coupling)
     step = cho_solve_banded((factor, True), gradient.ravel(), check_finite=False)
@@ -296,6 +300,7 @@ def _marginals(diagonal: Array, coupling: Array) -> Array:
     gains = np.empty_like(coupling)
     inverse[0] = np.linalg.inv(diagonal[0])
     for k in range(frames - 1):
+        # forward elimination, then the smoother's backward pass
         gains[k] = inverse[k] @ coupling[k]
         inverse[k + 1] = np.linalg.inv(diagonal[k + 1] - coupling[k].T @ gains[k])
     covariance = inverse

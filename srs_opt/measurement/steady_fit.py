@@ -59,6 +59,7 @@ class SteadyFit:
     @property
     def speed_m_s(self) -> float:
         """Return |turn rate| times mean distance from the centre; straight: displacement over time."""
+        # |W| times the distance from the centre, |v/(iW) + s|, in a form that is regular at W = 0
         return float(np.abs(self.drift + 1j * self.turn_rate_rad_s * self._mean_shape()).mean())
 
     @property
@@ -97,6 +98,7 @@ def fit_steady(time_s: Array, tracks: Complex, period_s: float, harmonics: int |
         _Part(t[seen], z[seen], waves[seen]) for z in tracks.T for seen in [np.isfinite(z)] if seen.any()
     ]
     start = turn_rate_guess(time_s, tracks, period_s)
+    # within half a radian of what the guess tells: further away the cost has side minima
     width = 0.5 / max(period_s, float(np.ptp(t)) / 4)
     cost = partial(_cost, parts)
     found = minimize_scalar(
@@ -124,6 +126,7 @@ class _Part:
 
     def __init__(self, t: Array, z: Complex, waves: Complex) -> None:
         self.t, self.z = t, z
+        # once per marker: the waves do not depend on the turn rate that is searched
         self.basis, self.triangle = np.linalg.qr(waves)
 
     def leftover(self, values: Complex) -> Complex:
@@ -142,6 +145,7 @@ class _Part:
 def _carry(rate: float, t: Array) -> Complex:
     """Return g(t) = (1 - e^{-iWt})/(iW), regular at W = 0."""
     half = rate * t / 2
+    # (1 - e^{-2ih})/(2ih) = e^{-ih} sin(h)/h; numpy's sinc has pi in it
     return np.asarray(t * np.exp(-1j * half) * np.sinc(half / np.pi))
 
 
@@ -157,6 +161,7 @@ def _sums(parts: list[_Part], rate: float) -> tuple[float, complex, float]:
 
 def _cost(parts: list[_Part], rate: float) -> float:
     square, product, norm = _sums(parts, rate)
+    # what is left of the samples after the best drift (variable projection)
     return square - abs(product) ** 2 / max(norm, 1e-300)
 
 
@@ -175,6 +180,7 @@ def turn_rate_guess(time_s: Array, tracks: Complex, period_s: float) -> float:
         both = np.where(np.isfinite(now) & np.isfinite(later), 1.0, np.nan)
         a = now * both - np.nanmean(_safe(now * both), axis=1, keepdims=True)
         b = later * both - np.nanmean(_safe(later * both), axis=1, keepdims=True)
+        # in the complex plane the best rotation is the argument of this sum
         turn = np.nansum(np.conj(a) * b)
     else:
         step = later - now

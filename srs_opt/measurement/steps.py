@@ -86,6 +86,7 @@ def fit_step(test: StepTest, *, fit_delay: bool = False) -> StepFit:
     unknowns = 4 if fit_delay else 3
     if len(time) <= unknowns:
         raise InputError(f"step '{test.test}' has {len(time)} samples, expected more than {unknowns}")
+    # curvature in units of its end value: all unknowns are of order one
     final = float(np.median(curvature[-max(3, len(time) // 10) :])) or 1.0
 
     def model(p: Array) -> Array:
@@ -93,6 +94,7 @@ def fit_step(test: StepTest, *, fit_delay: bool = False) -> StepFit:
 
     lows, highs = [-np.inf, 1e-5, -2.0, -1.0][:unknowns], [np.inf, 1e3, STEP_TEST.largest_q, 1.0][:unknowns]
     fits = []
+    # nearly equal and unlike time constants: the fit can stall on the wrong side
     for q in (0.05, 0.6):
         start = [1.0, _rise_time(time, curvature / final) / 2, q, 0.0][:unknowns]
         fits.append(least_squares(lambda p: model(p) - curvature, start, bounds=(lows, highs), x_scale="jac"))
@@ -188,6 +190,7 @@ def time_constants(s: float, q: float, covariance: Array) -> tuple[TimeConstant,
     from scipy.special import ndtri
 
     nodes = ndtri((np.arange(STEP_TEST.grid) + 0.5) / STEP_TEST.grid)
+    # 1e-18 keeps the factor where a value has no error
     root = np.linalg.cholesky(covariance + np.diag([1e-18, 1e-18]))
     u, v = np.meshgrid(nodes, nodes, indexing="ij")
     # of s on q: where q is moved to 0, s moves along with it

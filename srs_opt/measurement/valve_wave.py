@@ -32,6 +32,7 @@ class ValveWave:
 
     def held(self, segments: int, end_s: float) -> tuple[Array, Array]:
         """Return when the valves change, (n + 1,) from 0 to `end_s`, and how they are held, (segments, n)."""
+        # a little off round instants, where S = sign(0) of (13) would be doubtful
         fine = np.arange(RUN_IN.switch_s / 200, max(end_s, RUN_IN.switch_s), RUN_IN.switch_s)
         states = np.array([self.states(i, fine) for i in range(1, segments + 1)])
         change = np.flatnonzero((np.diff(states, axis=1) != 0).any(axis=0))
@@ -52,6 +53,7 @@ def first_curvatures(robot: Robot, wave: ValveWave, time_s: Array, slowness: flo
     total = robot.tau1_s + robot.tau2_s
     s, q = slowness * total / 2, ((robot.tau1_s - robot.tau2_s) / total) ** 2
     times, states = wave.held(robot.segments, float(time_s[-1]))
+    # from vented: the first change is a step, too; superposed, as (15) is linear
     changes = np.diff(states, axis=1, prepend=0.0)
     columns = np.zeros((len(time_s), robot.segments))
     for time, change in zip(times, changes.T):
