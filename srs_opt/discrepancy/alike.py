@@ -49,6 +49,7 @@ class Angles:
     def columns(self, candidate: Candidate) -> list[int]:
         """Return where a candidate's sizes are; nothing for one that is fitted or not seen by the data."""
         own = [self._names.get(c.name, -1) for c in candidate.sizes]
+        # what the projection leaves below 1e-9 of a column is rounding, and its direction means nothing
         if min(own) < 0 or any(self._seen[k, k] <= 1e-9 * self._whole[k] for k in own):
             return []
         return own
@@ -75,6 +76,7 @@ class Angles:
 def _root(matrix: np.ndarray) -> np.ndarray:
     """Return the inverse square root of a small positive matrix."""
     values, vectors = np.linalg.eigh(matrix)
+    # the floor keeps columns that are multiples of each other from dividing by zero
     return np.asarray(vectors / np.sqrt(np.maximum(values, 1e-300)) @ vectors.T)
 
 

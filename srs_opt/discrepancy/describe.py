@@ -206,6 +206,7 @@ def _contenders(tried: Sequence[Hypothesis], settings: DescriptionSettings) -> l
 
 def _left(hypothesis: Hypothesis) -> float:
     """Return the misfit beyond the noise."""
+    # 1e-3 keeps ratios of misfits finite where nothing is left
     return max(hypothesis.fit.misfit_ratio - 1, 1e-3)
 
 

@@ -116,6 +116,7 @@ def _instrument_gain(
 ) -> float:
     """Return the deviance by which a reading would tell two hypotheses apart."""
     readings = [expected(h.fit.point.values) for h in (a, b)]
+    # the prediction is uncertain, too, of which the less certain hypothesis counts
     variance = max(_reading_variance(expected, h) for h in (a, b))
     return float((readings[0] - readings[1]) ** 2 / (sd**2 + variance))
 
@@ -204,6 +205,7 @@ def _trial_gains(
 ) -> dict[str, float]:
     """Return the deviance by which `other`, refitted to all data, would miss what `truth` predicts."""
     trials = tuple(new.values())
+    # what all data so far tell enters as a prior: the new trial is judged after a refit to everything
     known = np.linalg.pinv(other.fit.covariance, hermitian=True)
     free = [k for k in range(len(other.fit.coordinates)) if other.fit.covariance[k, k] > 0]
     none = np.zeros(len(other.fit.coordinates))

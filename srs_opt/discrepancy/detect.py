@@ -73,10 +73,13 @@ def project(
     """
     f, e = np.asarray(fitted), np.asarray(further)
     inner = total[np.ix_(f, f)] + np.diag(precision)
+    # scaled to unit diagonal, so that the rank does not depend on the coordinates' units
     scale = 1 / np.sqrt(np.maximum(np.diag(inner), 1e-300))
     inverse = np.linalg.pinv(inner * scale[:, None] * scale, rcond=1e-12, hermitian=True)
     inverse *= scale[:, None] * scale
     cross = total[np.ix_(e, f)]
+    # s_e - C A^-1 s_f with A the fitted part, priors included: the refit is taken off both score and
+    # covariance
     score = total[e, -1] - cross @ (inverse @ (total[f, -1] - precision * offset))
     covariance = total[np.ix_(e, e)] - cross @ inverse @ cross.T
     return score, (covariance + covariance.T) / 2
@@ -120,6 +123,7 @@ def detect(
     z, correlation = score / size, covariance / size[:, None] / size
     values, vectors = np.linalg.eigh(correlation)
     root = vectors * np.sqrt(np.maximum(values, 0))
+    # all groups are tested on the same draws, so that what they share is accounted for
     drawn = rng.standard_normal((DETECTION.draws, z.size)) @ root.T
     observed, found = [], []
     largest: dict[int, np.ndarray] = {}  # of the drawn values, by the number of degrees of freedom
@@ -132,11 +136,14 @@ def detect(
         observed.append(p)
         if dof:
             values = np.square(drawn[:, list(group)] @ whiten).sum(axis=1)
+            # at equal degrees of freedom p falls with the value: only the largest can have the smallest p
             largest[dof] = np.maximum(largest.get(dof, 0.0), values)
     smallest = np.min(
         [np.ones(DETECTION.draws), *(chdtrc(dof, values) for dof, values in largest.items())], axis=0
     )
+    # counting the data themselves among the draws: never 0, and valid for any number of draws
     adjusted = tuple(float((1 + np.sum(smallest <= p)) / (1 + smallest.size)) for p in observed)
+    # one-sided: what a model lacks makes neighbouring frames alike, never opposite
     serial_p = float(ndtr(-serial.sum() / np.sqrt(max(serial.size, 1)))) if serial.size else 1.0
     # Bonferroni, with the level shared unequally: the autocorrelation sees little more than the groups
     whole = min(
@@ -148,5 +155,6 @@ def detect(
 def _whiten(correlation: np.ndarray) -> np.ndarray:
     values, vectors = np.linalg.eigh(correlation)
     keep = values > DETECTION.least_eigenvalue * max(values[-1], 1e-300)
+    # directions that rounding alone fills
     keep &= values > 1e-9
     return np.asarray(vectors[:, keep] / np.sqrt(values[keep]))

@@ -75,4 +75,5 @@ def needed_gain(candidate: Candidate, family: int) -> float:
     """Return the drop of the deviance that the best of `family` candidates reaches by chance once in 500."""
     from scipy.special import chdtri
 
+    # Bonferroni over the family; a candidate's gain is chi squared with one degree of freedom per coordinate
     return float(chdtri(len(candidate.coordinates), DETECTION.name_level / max(family, 1)))

@@ -67,6 +67,7 @@ def linearised(
         stale = True
     wide = experiment.normal_equations(point, coordinates, screened, functions, rough=rough, stale=stale)
     whole = found | wide
+    # in the trials' order: sums over them then have the same bits however they were asked for
     ordered = {t.name: whole.pop(t.name) for t in trials} | whole
     return Linearisation(
         coordinates, len(fit.coordinates), point, ordered, fit.variance_inflation, frozenset(wide)
@@ -105,5 +106,6 @@ def examined(
 
 def _widened(normal: NormalEquations, first: int, count: int) -> NormalEquations:
     """Return the equations with `count` columns of zeros from column `first` on."""
+    # zeros in rows and columns: these trials say nothing of the candidates
     raw = np.insert(normal.raw, [first] * count, 0.0, axis=0)
     return replace(normal, raw=np.insert(raw, [first] * count, 0.0, axis=1))

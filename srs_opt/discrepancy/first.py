@@ -46,6 +46,7 @@ def first_experiment(dataset: DataSet, noise: Noise, model: str | None = None) -
     limit = chdtri(1, DETECTION.name_level / len(candidates))
     powers: dict[str, float] = {}
     for k, candidate in enumerate(candidates):
+        # the deviance expected of the effect at typical size: noncentrality of the test
         gain = candidate.sizes[0].typical ** 2 * float(left[k, k])
         found = float(1 - chndtr(limit, 1, max(gain, 1e-9)))
         powers[candidate.effect] = min(found, powers.get(candidate.effect, 1.0))

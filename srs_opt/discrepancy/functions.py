@@ -52,6 +52,7 @@ class ResidualFunctions:
     def of(trials: tuple[Trial, ...]) -> ResidualFunctions:
         """Return the functions for a set of trials."""
         table = np.array([(t.frequency_hz, t.pressure_kpa, t.offset) for t in trials])
+        # a condition that never changes makes no column: divided by infinity
         spread = np.where(table.std(axis=0) > 0, table.std(axis=0), np.inf)
         first = trials[0].markers_m
         markers = 1 if first is None else first.shape[1]
@@ -125,6 +126,7 @@ class ResidualFunctions:
             for function in functions
         ]
         columns += _room(points, trial.time_s)
+        # a coefficient of 1 is a millimetre: columns of sizes that compare with the noise's
         return UNIT_M * np.stack(columns, axis=2)
 
 
@@ -170,6 +172,7 @@ def _times(
     waves = [np.cos(phase), np.sin(phase), np.cos(2 * phase), np.sin(2 * phase)]
     conditions = (trial.frequency_hz, trial.pressure_kpa, trial.offset)
     scaled = [(v - c) / s for v, c, s in zip(conditions, centres, spreads)]
+    # about the mean, so that constant and trend do not imitate each other
     return [[one, t - t.mean()], waves, *([v * f for f in (one, *waves[:2])] for v in scaled)]
 
 

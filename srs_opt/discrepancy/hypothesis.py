@@ -119,6 +119,7 @@ def fit_key(candidates: Sequence[Candidate], quick: bool) -> tuple[frozenset[str
 
 def cost(hypothesis: Hypothesis) -> float:
     """Return the deviance, counting 2 per parameter."""
+    # Akaike's criterion
     return hypothesis.deviance + 2 * hypothesis.parameters
 
 

@@ -51,6 +51,7 @@ def motion_errors(
         speeds.append(predicted[0] / measured[0] - 1)
         cycles = (trial.time_s[-1] - trial.time_s[0]) / trial.period_s
         if abs(measured[1]) * cycles >= SEAL.least_turn_rad and predicted[1] != 0:
+            # radius = speed / turn rate
             radii.append(predicted[0] / measured[0] * measured[1] / predicted[1] - 1)
     return _root_mean_square(speeds), _root_mean_square(radii)
 
@@ -79,6 +80,7 @@ def _advance(trial: Trial, track: np.ndarray) -> tuple[float, float] | None:
         bodies = [
             np.where(both, z - (z.sum(axis=1) / np.maximum(seen, 1))[:, None], 0.0) for z in (now, then)
         ]
+        # in the complex plane the best rotation is the argument of this sum
         turn = float(np.angle(np.sum(bodies[1] * np.conj(bodies[0]))))
     else:
         step = np.where(frames, then[:, 0] - now[:, 0], 0.0)

@@ -103,6 +103,7 @@ def screen(
     now = np.array([lin.point.values.get(c.name, 0.0) for c in lin.coordinates])
     lower = np.array([c.lower for c in lin.coordinates]) - now
     base = list(range(lin.fitted))
+    # before anything is dropped: a swap has to beat the model with the effect in it
     reference = bounded_solve(total, base, precision, offset, lower)
     gone = [lin.column(c.name) for k in dropped for c in k.coordinates]
     if gone:
@@ -115,6 +116,7 @@ def screen(
             continue
         solution = bounded_solve(total, [*base, *own], precision, offset, lower)
         free = np.diag(total)[own]
+        # information on a size once the fitted have followed, against that with them held
         kept = 1 / np.maximum(np.diag(solution.covariance)[len(base) :], 1e-300)
         with np.errstate(divide="ignore", invalid="ignore"):
             share = 1 - np.where(free > 0, kept / free, 1.0)
@@ -131,6 +133,7 @@ def _without(
     step = np.zeros(total.shape[0])
     step[gone] = -now[gone]
     moved = total.copy()
+    # residual r - Y step: gradient and deviance of the quadratic, moved
     moved[:, -1] -= total @ step
     moved[-1, -1] = total[-1, -1] - 2 * total[-1] @ step + step @ total @ step
     moved[-1, :-1] = moved[:-1, -1]
@@ -141,6 +144,7 @@ def expected_start(lin: Linearisation, score: Score, damped: float = 1.0) -> Poi
     """Return where to begin a refit with the candidate added: at its expected sizes, within reason."""
     values = dict(lin.point.values)
     for coordinate, step in zip(score.candidate.sizes, score.step):
+        # about a fit that is far off linear sizes can be absurd
         reach = SCREEN.start_reach * coordinate.typical
         values[coordinate.name] = float(np.clip(damped * step, -reach, reach))
     for coordinate in score.candidate.scales:

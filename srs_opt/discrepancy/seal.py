@@ -120,6 +120,7 @@ def open_seal(
     sizes = _sizes(total, correlated_m)
     ratio, interval = _ratio(sizes), None
     drawn = [
+        # whole blocks are drawn: residuals within half a second are not independent
         _ratio(_sizes(blocks[rng.integers(len(blocks), size=len(blocks))].sum(axis=0), correlated_m))
         for _ in range(SEAL.draws)
     ]
@@ -199,6 +200,8 @@ def _sizes(total: np.ndarray, correlated_m: float) -> tuple[float, float, float]
     """Return the root mean squares before and after, and the noise floor."""
     before, after = total[:2] / max(total[2], 1.0)
     repeated = total[3] / max(total[4], 1.0)
+    # mean square less what later frames repeat is white noise; of the repeated part the known colour is
+    # noise, too
     floor = max(after - repeated, 0.0) + min(correlated_m**2, max(repeated, 0.0))
     return float(np.sqrt(before)), float(np.sqrt(after)), float(np.sqrt(floor))
 

@@ -109,6 +109,7 @@ class Search:
             )
         except NoAnswerError:
             return None
+        # another start may end in a worse optimum: the better one is kept
         if known is None or found.deviance < known.deviance:
             self._fits[key] = found
         return self._fits[key]

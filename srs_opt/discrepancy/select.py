@@ -92,6 +92,7 @@ def left_out_deviance(hypothesis: Hypothesis, folds: Sequence[Sequence[str]]) ->
     }
     found = []
     for fold in folds:
+        # (step, -1)' M (step, -1) is the quadratic form's deviance after the step
         step = np.append(_step_without(hypothesis.fit, fold), -1.0)
         found += [float(step @ parts[name].matrix @ step) + parts[name].log_det for name in fold]
     return np.array(found)

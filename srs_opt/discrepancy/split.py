@@ -95,6 +95,7 @@ def _conditions(trials: Sequence[Trial]) -> list[list[Trial]]:
         groups: dict[Hashable, list[Trial]] = defaultdict(list)
         for t in trials:
             groups[key(t)].append(t)
+        # sorted by what they are: the split does not depend on the order of the file
         found = [groups[k] for k in sorted(groups, key=repr)]
         if len(found) > SPLIT.least_open and len(trials) - min(map(len, found)) >= SPLIT.least_open:
             break
@@ -128,6 +129,7 @@ def _from_the_middle(trials: Sequence[Trial]) -> list[int]:
     table = np.array([(t.frequency_hz, t.pressure_kpa, t.offset, t.phase_lag_rad) for t in trials])
     spread = table.std(axis=0)
     scaled = (table - np.median(table, axis=0)) / np.where(spread > 0, spread, np.inf)
+    # rounded, so that ties are ties on every machine; the stable sort then decides by order
     distance = np.round(np.linalg.norm(scaled, axis=1), 6)
     return [int(k) for k in np.argsort(distance, kind="stable")]
 

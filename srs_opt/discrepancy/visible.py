@@ -95,6 +95,7 @@ def visible(
     figures = []
     for size, candidate in sizes.values():
         column = lin.column(candidate.sizes[0].name)
+        # where the fit would go to make up for the effect: least squares of -size times its column
         follow = -size * (inverse @ total[: lin.fitted, column])
         values = dict(point.values)
         for c, step in zip(lin.coordinates, follow):
