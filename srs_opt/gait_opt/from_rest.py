@@ -18,14 +18,13 @@ from typing import Any
 import numpy as np
 
 from srs_opt.gait import Gait
-from srs_opt.gait_opt.certificate import standing_start
+from srs_opt.gait_opt.certificate import reached_from_rest, standing_start
 from srs_opt.gait_opt.collocation.problem import CycleProblem
 from srs_opt.gait_opt.continuation import Step, orbits_of
 from srs_opt.gait_opt.corrections import on_ticks
 from srs_opt.gait_opt.evolution import evolution
 from srs_opt.gait_opt.population import Coordinates, simulated_costs
 from srs_opt.gait_opt.search_settings import FROM_REST
-from srs_opt.gait_opt.settings import CERTIFICATE
 
 
 @dataclass(frozen=True)
@@ -99,7 +98,6 @@ def search_from_rest(problem: CycleProblem, gait: Gait, seed: int = 0) -> FromRe
 def _stands(problem: CycleProblem, gait: Gait) -> bool:
     """Whether a standing start comes to the steady motion on every robot, as the certificate will ask."""
     return all(
-        abs(standing_start(robot, gait, problem.model) - orbit.speed_m_s)
-        < CERTIFICATE.standing_start * orbit.speed_m_s
+        reached_from_rest(robot, orbit.speed_m_s, standing_start(robot, gait, problem.model))
         for robot, orbit in zip(problem.robots, orbits_of(problem, gait))
     )

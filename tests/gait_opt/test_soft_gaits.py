@@ -1,6 +1,7 @@
 """Gaits of soft bodies: bends are collocated, and the optimum holds when simulated from rest."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -115,6 +116,18 @@ def test_search_from_rest_gains_on_ticks_inside_the_limits(monkeypatch):
     assert ticks == pytest.approx(np.round(ticks), abs=1e-6)
     again = from_rest.search_from_rest(case, start, seed=3)
     assert again.gait == found.gait
+
+
+@pytest.mark.parametrize(
+    ("steady_m_s", "standing_m_s", "stands"),
+    [(0.2, 0.199, True), (0.2, 0.197, False), (-0.2, -0.199, True), (-0.2, -0.197, False), (4e-4, 0.0, True)],
+)
+def test_a_standing_start_is_judged_alike_forwards_backwards_and_turning_in_place(
+    monkeypatch, steady_m_s, standing_m_s, stands
+):
+    monkeypatch.setattr(from_rest, "orbits_of", lambda *_: (SimpleNamespace(speed_m_s=steady_m_s),))
+    monkeypatch.setattr(from_rest, "standing_start", lambda *_: standing_m_s)
+    assert from_rest._stands(problem(SOFT), robust_gait()) == stands
 
 
 def test_orbits_that_rest_does_not_reach_are_noticed():
