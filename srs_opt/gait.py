@@ -129,6 +129,7 @@ class Gait:
     def mirrored(self) -> Gait:
         """Return the gait with left and right exchanged (it turns the other way)."""
         flipped = tuple(
+            # where one chamber was off the other is on: from every off to the next on
             tuple((pairs[k - 1][1], pairs[k][0]) for k in range(len(pairs)))
             for pairs in (tuple(sorted(p)) for p in self.intervals)
         )
@@ -138,6 +139,7 @@ class Gait:
         """Return the gait with every switch later: the same motion, the cycle begun elsewhere."""
 
         def moved(t: float) -> float:
+            # a rounding error before the end is the start of the cycle
             late = (t + delay_s) % self.period_s
             return 0.0 if late >= self.period_s - _COINCIDENT_S / 10 else late
 
@@ -150,6 +152,7 @@ class Gait:
         Zero when the on-intervals of all segments together are centred on the cycle's begin.
         """
         turn = 2j * math.pi / self.period_s
+        # the integral of exp(i omega t) over the on-intervals, i omega taken out
         harmonic = sum(
             np.exp(turn * off) - np.exp(turn * on) for pairs in self.intervals for on, off in pairs
         )
@@ -254,6 +257,7 @@ class Wave:
 
         intervals = []
         for beta, phi in zip(self.phase_rad, self.offset):
+            # sin(omega t + beta) > -phi from omega t = -a - beta to pi + a - beta
             a = math.asin(phi)
             intervals.append(((time(-a - beta), time(math.pi + a - beta)),))
         return Gait(period, self.pressure_kpa, tuple(intervals))

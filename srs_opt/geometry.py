@@ -85,7 +85,9 @@ def distance_along(points: np.ndarray) -> Array:
 def centre_of_rotation(displacement: np.ndarray) -> np.ndarray | None:
     """Return the fixed point of the rigid motion (dx, dy, turn), or None for a translation."""
     dx, dy, turn = displacement
+    # a turn below this is rounding
     if abs(turn) < 1e-12:
         return None
+    # c = (I - R)^-1 d, written with the cotangent of half the angle
     half = 1 / np.tan(turn / 2)
     return np.array([(dx - half * dy) / 2, (dy + half * dx) / 2])

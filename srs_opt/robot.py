@@ -139,6 +139,7 @@ class Robot:
         for key in ("name", "sources", "relative_sd", "plugins"):
             del record[key]
         record["effects"] = [{k: v for k, v in e.items() if k != "sd"} for e in record["effects"]]
+        # a relaxation time means nothing in a rigid body
         if not self.is_soft:
             record.pop("bending_relaxation_s", None)
         if self.effects:
@@ -155,6 +156,7 @@ class Robot:
         return _restored, (self.to_record(), plugins.exported())
 
     def __hash__(self) -> int:
+        # the mappings in it cannot be hashed themselves
         return hash(json.dumps(self.to_record(), sort_keys=True))
 
 

@@ -115,4 +115,5 @@ def _pascal(pressure_kpa: float) -> int:
 
 
 def _milli(value: float) -> int:
+    # 16 bits in the firmware's tables
     return max(-32767, min(32767, round(value * 1e3)))

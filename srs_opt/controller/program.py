@@ -160,6 +160,7 @@ class Program:
 
     def ticks(self, time_s: float) -> int:
         """Return a time in ticks, rounded up, within 16 bits."""
+        # rounded up: a dwell must not become shorter
         return min(max(0, -int(-time_s / self.tick_s // 1)), 0xFFFE)
 
 

@@ -15,6 +15,7 @@ Factor = Callable[[Symbols, LinkState], ca.SX]
 
 def along(factor: Factor) -> dict[str, Any]:
     """Return the hook of a factor on the friction along the wheels."""
+    # the floor keeps friction from turning into a drive where a fit goes far
     return {"wheel_factors": lambda e, s: (ca.fmax(factor(e, s), TERM.least_factor), 1.0)}
 
 
@@ -50,6 +51,7 @@ def towards(e: Symbols, s: LinkState) -> ca.SX:
 
 def with_grain(e: Symbols, s: LinkState) -> ca.SX:
     """Return the cosine between a link's rolling and the effect's direction in the room."""
+    # cos(link's heading in the room less the direction), by the sum of angles
     turned = s.heading - e["direction"]
     return (s.cos * ca.cos(turned) - s.sin * ca.sin(turned)) * sign(s.along)
 
@@ -61,6 +63,7 @@ def beyond_edge(e: Symbols, s: LinkState) -> ca.SX:
 
 def drag(e: Symbols, s: LinkState) -> tuple[ca.SX, ca.SX]:
     """Return a drag with the square of the speed."""
+    # the friction's smoothing speed keeps the root differentiable at rest
     speed = ca.sqrt(s.v_x**2 + s.v_y**2 + s.friction_speed**2)
     return -e["drag"] * speed * s.v_x, -e["drag"] * speed * s.v_y
 
@@ -83,6 +86,7 @@ def couple(e: Symbols, s: LinkState) -> tuple[ca.SX, ca.SX]:
     c, h = ca.cos(s.heading), ca.sin(s.heading)
     dx, dy = s.room_x[-1] - s.room_x[0], s.room_y[-1] - s.room_y[0]
     ahead, left = c * dx + h * dy, c * dy - h * dx
+    # a couple F at the distance d, F = moment / d, along (left, -ahead) / d
     per_m = e["moment"] / (ahead**2 + left**2)
     fx, fy = ca.SX.zeros(s.v_x.shape), ca.SX.zeros(s.v_y.shape)
     fx[0], fy[0], fx[-1], fy[-1] = per_m * left, -per_m * ahead, -per_m * left, per_m * ahead
@@ -109,6 +113,7 @@ def late(side: float) -> dict[str, Any]:
 
 def slack(e: Symbols, rate: ca.SX, memory: ca.SX) -> ca.SX:
     """Return the rate of a play that is taken up over a width of bend; none where there is no width."""
+    # Dahl's model: memory' = kappa' - |kappa'| memory / width, which saturates at the width
     return (e["width"] > 0) * (rate - ca.fabs(rate) * memory / ca.fmax(e["width"], TERM.least_play_1_m))
 
 

@@ -94,6 +94,7 @@ class Changes:
         levels, cells = self.speed[before].tolist(), self.moved[before, now].tolist()
         if not any(map(any, cells)):
             return None
+        # whole numbers throughout, as the firmware computes: both choose the same gait to the last bit
         low = 1 if speed > levels[1] else 0
         weight = _divided((speed - levels[low]) * WEIGHT_STEPS, max(levels[low + 1] - levels[low], 1))
         weight = min(max(weight, WEIGHTS[0]), WEIGHTS[1])

@@ -72,6 +72,7 @@ def _bisected(at: Callable[[float], float], a: float, b: float, tolerance: float
     """Return a root between a and b (regula falsi with halving, so that the function need not be smooth)."""
     for k in range(DUTY_BIAS.most_bisections):
         fa, fb = at(a), at(b)
+        # every third step halves: regula falsi alone creeps where the function is bent
         c = (a + b) / 2 if k % 3 == 2 or fa == fb else a - fa * (b - a) / (fb - fa)
         fc = at(c)
         if np.isnan(fc):
@@ -115,6 +116,7 @@ def on_ticks(gait: Gait, tick_s: float, frequency_hz: tuple[float, float] | None
 
     The period is rounded to an even number of ticks, inside the frequency limits where they are given.
     """
+    # an even number, so that half a cycle is whole ticks and a straight gait stays straight
     even = 2 * tick_s
     count = max(round(gait.period_s / even), 2)
     if frequency_hz is not None:
@@ -140,5 +142,6 @@ def in_step(gait: Gait, tick_s: float) -> Gait:
     wave, the wave runs on through a change; otherwise the body jerks from one shape into another, and that
     costs a fifth of a second of way each time.
     """
+    # rounded to whole ticks: the phase is zero to half a tick
     delay = -gait.wave_phase_rad() / (2 * np.pi) * gait.period_s
     return gait.later(round(delay / tick_s) * tick_s)

@@ -137,6 +137,7 @@ class _Evolution:
             moved = random.uniform(size=children.shape) < random.uniform(0.2, 1.0, (len(children), 1))
             children = children + spread * moved * random.standard_normal(children.shape)
             if straight:
+                # the middle of the range is an offset of zero: no duty bias, no turn
                 children[:, 2 + self.robot.segments :] = 0.5
             offspring = self.simulated(np.clip(children, 0.0, 1.0))
             if offspring.orbits:

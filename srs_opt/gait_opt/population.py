@@ -68,6 +68,7 @@ class Coordinates:
 
 def _reflected(share: np.ndarray) -> np.ndarray:
     """Return numbers folded into [0, 1]."""
+    # folded and not clipped: clipping would pile a population up at the limits
     folded: np.ndarray = 1 - np.abs(1 - np.mod(share, 2.0))
     return folded
 

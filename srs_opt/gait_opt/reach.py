@@ -52,6 +52,7 @@ def least_curvature_1_m(problem: CycleProblem, robot: Robot) -> float | None:
     numbers = parameter_numbers(robot, kind)
     k = problem.intervals
     (slow, fast), pressures = problem.limits.frequency_hz, problem.limits.pressure_kpa
+    # evenly spread pulses: the actuator smooths them most
     starts = np.arange(k) / k
     best = np.full(kind.segments, np.inf)
     for share in _SHARES:

@@ -33,6 +33,7 @@ def starting_gaits(problem: CycleProblem, count: int, seed: int) -> list[Gait]:
     segments = robot.segments
     sampler = qmc.Sobol(3 + segments, seed=seed)
     wholeturn = 2 * math.pi
+    # Sobol sequences are balanced at powers of two
     for u in sampler.random(1 << max(count - 1, 1).bit_length())[: count - 1]:
         ranges = (limits.frequency_hz, limits.pressure_kpa)
         frequency, pressure = (float(a + v * (b - a)) for v, (a, b) in zip(u, ranges))
@@ -73,6 +74,7 @@ def best_start(problem: CycleProblem, gaits: Sequence[Gait]) -> Gait:
         with suppress(NoAnswerError):
             if problem.goal.radius_m is not None:
                 start = steered(start, turn_miss(problem), START.turn_tolerance_rad_s)
+            # -k: of equal scores the first start wins, and gaits are never compared
             found.append((score(problem, start, orbits_of(problem, start)).total, -k, start))
     if not found:
         raise NoAnswerError("no starting gait reaches a steady motion")

@@ -111,6 +111,7 @@ def pull_of(robot: Robot, *, room: bool) -> Pull | None:
     anchor = values.get("tether_pull", {"force_n": 0.0, "ax_m": 0.0, "ay_m": 0.0})
 
     def pull(_: float, x: float, y: float, vx: float, vy: float) -> tuple[float, float, float]:
+        # dry friction of the hose, smoothed at rest
         brake = damping + drag / math.sqrt(vx * vx + vy * vy + REPLAY.tether_speed_m_s**2)
         dx, dy = float(anchor["ax_m"]) - x, float(anchor["ay_m"]) - y
         towards = float(anchor["force_n"]) / max(math.hypot(dx, dy), 1e-9)

@@ -117,6 +117,7 @@ def _has_settled(motions: Sequence[CycleMotion], length_m: float) -> bool:
     lever_m = SETTLING.lever_body * length_m
     rates = np.array([[m.speed_m_s, m.turn_rate_rad_s * lever_m] for m in motions[-4:]])
     changes = np.hypot(*np.diff(rates, axis=0).T)
+    # the slower of the last two ratios, so that one lucky cycle does not end the wait
     ratio = min(
         max(changes[-1] / max(changes[-2], 1e-12), changes[-2] / max(changes[-3], 1e-12)),
         SETTLING.slowest_ratio,

@@ -161,6 +161,7 @@ def replay(robot: Robot, motion: Mapping[str, Any], settings: EngineSettings = E
     try:
         phases = phases_of(motion, run)
         start = tuple(float(v) for v in maze["start"])
+        # motion.json holds tenths of a millimetre
         ours = 1e-4 * np.array(run["centre"], dtype=float)
     except (TypeError, KeyError, ValueError, IndexError) as error:
         raise InputError(f"motion.json: its runs cannot be played ({json.dumps(str(error))})") from error
@@ -249,6 +250,7 @@ def _cycle(entry: Mapping[str, Any]) -> Phases:
     ramp_s = float(entry.get("ramp_s", 0.0))
     if ramp_s > 0:
         edges = np.union1d(edges, np.linspace(0.0, ramp_s, math.ceil(ramp_s / REPLAY.stair_s) + 1))
+        # edges that coincide but for rounding end one phase
         edges = edges[np.append(True, np.diff(edges) > 1e-9)]
     middles = (edges[:-1] + edges[1:]) / 2
     valve = np.stack([gait.valve(t) for t in middles], axis=1)

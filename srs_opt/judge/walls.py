@@ -60,6 +60,7 @@ def _cells(cells: Mapping[str, Any]) -> list[Any]:
     from PIL import Image
 
     picture = Image.open(io.BytesIO(base64.b64decode(cells["png"]))).convert("LA")
+    # a picture's rows run downwards, the room's y upwards
     occupied = np.asarray(picture)[::-1, :, 1] > 0
     x0, y0, heading = cells["origin"]
     width, height = cells["size"]

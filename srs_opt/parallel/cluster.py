@@ -95,6 +95,7 @@ class Cluster:
         rest = iter(pieces)
         while True:
             while len(under_way) < width and (piece := next(rest, None)) is not None:
+                # pure=False: a work with memory may answer differently when asked the same again
                 under_way.append(self._client.submit(work, piece, pure=False))
             if not under_way:
                 return

@@ -66,6 +66,7 @@ class _Team:
     def __init__(self, work: Work, shares: Sequence[Sequence[str]]) -> None:
         self._own, self._own_names = work, frozenset(shares[0])
         self._members: list[tuple[Any, Connection, frozenset[str]]] = []
+        # a fork would copy locks and threads of numerical libraries in whatever state they are
         context = multiprocessing.get_context("spawn")
         for share in shares[1:]:
             if share:
@@ -73,6 +74,7 @@ class _Team:
                 process = context.Process(target=_serve, args=(there, work.part(share)), daemon=True)
                 with workers_deaf_to_interrupts():
                     process.start()
+                # only then does the end of the process show here as the end of the pipe
                 there.close()
                 self._members.append((process, here, frozenset(share)))
 
@@ -102,6 +104,8 @@ class _Team:
             raise NoAnswerError(
                 "a worker process has died (killed, or out of memory); try fewer --jobs"
             ) from error
+        # in the order asked for: sums over the answers then have the same bits however many processes there
+        # are
         return {n: found[n] for n in names}
 
     def close(self, *, at_once: bool) -> None:

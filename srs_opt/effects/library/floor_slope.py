@@ -9,6 +9,7 @@ from srs_opt.effects.parameter import Direction, EffectParameter
 
 
 def _force(e: Symbols, s: LinkState) -> tuple[ca.SX, ca.SX]:
+    # the load on the wheels keeps its size: cos(angle) is 1 to 2e-5 at the typical angle
     weight = s.mass * s.gravity * ca.sin(e["angle"])
     return to_body_frame(weight * ca.cos(e["direction"]), weight * ca.sin(e["direction"]), s.heading)
 

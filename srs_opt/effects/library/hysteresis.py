@@ -14,5 +14,6 @@ EFFECT = Effect(
     what="the curvature at a pressure depends on where the segment came from (internal friction)",
     look="raise and lower the pressure of one segment slowly and plot curvature over pressure",
     restoring=lambda e, kappa, memory: e["ratio"] * memory,
+    # Dahl's model: the memory follows the curvature and saturates at the width, whatever the rate
     memory_rate=lambda e, dkappa, memory: dkappa - ca.fabs(dkappa) * memory / e["width"],
 )

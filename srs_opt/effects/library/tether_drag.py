@@ -10,6 +10,7 @@ from srs_opt.effects.parameter import EffectParameter
 
 def _force(e: Symbols, s: LinkState) -> tuple[ca.SX, ca.SX]:
     v_x, v_y = s.v_x[0], s.v_y[0]
+    # Coulomb friction against the tail's velocity, smoothed as the cone law of `model.friction`
     pull = -e["force_n"] / ca.sqrt(v_x**2 + v_y**2 + s.friction_speed**2)
     n = s.v_x.shape[0]
     return on_link(n, 0, pull * v_x), on_link(n, 0, pull * v_y)
