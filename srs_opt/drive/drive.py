@@ -162,6 +162,7 @@ class Drive(Result):
             uniform = np.array(
                 [best.wave.frequency_hz, best.wave.pressure_kpa, abs(best.wave.offset[0]), _lag(best.wave)]
             )
+            # within the triangle: beyond it the map may fold
             limits = corners[:, :4].min(axis=0), corners[:, :4].max(axis=0)
             following = self.motion(self._wave(np.clip(uniform + step, *limits), side), reverse=reverse)
             if self._distance(following, target) >= self._distance(best, target):
@@ -234,6 +235,7 @@ def _lag(wave: Wave) -> float:
 
 def _jacobian(corners: np.ndarray) -> np.ndarray:
     """Return d(parameters)/d(motion) on a triangle, (4, 2)."""
+    # two edges as columns: parameters and motion are linear on a triangle
     motion = (corners[1:, 4:6] - corners[0, 4:6]).T
     parameters = (corners[1:, :4] - corners[0, :4]).T
     return np.asarray(parameters @ np.linalg.inv(motion))

@@ -114,6 +114,7 @@ def _certificate(work: _Work, entry: TableGait) -> tuple[TableGait | None, str]:
 def _on_ticks(work: _Work, entry: TableGait) -> tuple[TableGait | None, str]:
     limits, gait = work.limits, entry.gait
     (slow, fast), (weak, strong) = limits.frequency_hz, limits.pressure_kpa
+    # an entry's own pressure and frequency count as within the limits
     wide = replace(
         limits,
         frequency_hz=(min(slow, gait.frequency_hz), max(fast, gait.frequency_hz)),

@@ -72,6 +72,7 @@ def _constrained(objective: Objective, constraints: tuple[Formula, ...]) -> Obje
     """Return the objective with more constraints, also where another takes its place."""
     if not constraints:
         return objective
+    # the constraints hold for whatever takes the objective's place, too
     other = objective.unless_turn
     return replace(
         objective,

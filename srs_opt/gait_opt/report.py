@@ -26,6 +26,7 @@ def wave_parameters(gait: Gait) -> tuple[list[float], list[float]] | None:
     phases, offsets = [], []
     for ((on, off),) in gait.intervals:
         share = (off - on) % gait.period_s / gait.period_s
+        # (13) inverted: duty 1/2 + asin(phi)/pi, on at omega t = -asin(phi) - beta
         angle = math.pi * (share - 0.5)
         phases.append((-angle - 2 * math.pi * on / gait.period_s) % (2 * math.pi))
         offsets.append(math.sin(angle))

@@ -38,6 +38,7 @@ def stiffness_interval(robot: Robot) -> tuple[Robot, ...]:
     key, sd = stiffness_key(robot), stiffness_deviation(robot)
     if sd < STIFFNESS.least_sd:
         return (robot,)
+    # a factor, as the deviation is one of the logarithm: a stiffness stays positive
     reach, ei = math.exp(STIFFNESS.interval_sd * sd), getattr(robot, key)
     what = "gap EI" if key == "gap_stiffness_n_m2" else "EI"
     return robot, *(
@@ -103,4 +104,5 @@ def relative(problem: CycleProblem) -> CycleProblem:
                 f"the published gait makes {speeds[-1]:.4f} m/s on robot '{robot.name}', nothing to compare "
                 "with: use --worst absolute"
             )
+    # the nominal robot's weight is 1, so that merits keep their unit
     return replace(problem, weights=tuple(speeds[0] / speed for speed in speeds))

@@ -105,6 +105,7 @@ def _allowed(gait: Gait, limits: Limits) -> bool:
     low, high = limits.pressure_kpa
     slow, fast = limits.frequency_hz
     return (
+        # limits that are met but for rounding are met
         low - 1e-9 <= gait.pressure_kpa <= high + 1e-9
         and slow <= gait.frequency_hz * (1 + 1e-9)
         and (gait.frequency_hz <= fast * (1 + 1e-9))

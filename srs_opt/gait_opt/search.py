@@ -154,6 +154,7 @@ def search(
         candidates = starting_gaits(problem, starts, seed)
         # tight turns and pivots have more optima than starts: a population alone does better, and sooner
         stages = () if _rugged(problem) else continuation_stages(own, quick=problem.goal.only_fast)
+        # below 0.01 m/s stages are costly: only the best starts are carried on to them
         cut = max(len([r for r in stages if r.friction_speed_m_s >= 0.01]), len(stages) - 2)
         lower, upper = stages[:cut], stages[cut:]
         reach = GAIT_SEARCH.exact_reach
@@ -181,6 +182,7 @@ def search(
     if evolved and _rugged(problem):  # the starts were not searched
         continued = {}
     continued |= {len(candidates) + k: found for k, found in enumerate(evolved)}
+    # simulated scores, so that starts, populations and stages compare
     best = max(continued, key=lambda k: continued[k].score.total)
     reached = continued[best].gait
     settled: FromRest | None = None
@@ -296,6 +298,7 @@ def _all(
 ) -> tuple[dict[int, Continuation], bool]:
     """Return the continuations of all starts that lead somewhere, and whether Ctrl-C ended them early."""
     problem = continuing.problem
+    # the stages are part of the key: a start carried further is other work
     kept = None if where.resume is None else Resume(where.resume, f"gait_opt {problem} {stages}")
     work = partial(continuing, stages)
     continued: dict[int, Continuation] = {}

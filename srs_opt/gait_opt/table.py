@@ -48,6 +48,7 @@ class EntryCertificate:
     def settling_s(self, period_s: float) -> float:
         """Return the time in which a disturbance decays to 1/e: -period / ln(largest multiplier)."""
         multiplier = self.largest_floquet_multiplier
+        # a disturbance falls by the multiplier once per period
         return -period_s / math.log(multiplier) if multiplier > 0 else 0.0
 
 
@@ -235,8 +236,10 @@ class GaitTable(Result):
 
     def _off(self, speed_m_s: float, turn_rate_rad_s: float, lever_m: float) -> np.ndarray:
         """Return how far every gait's steady motion, in the controller's mm/s and mrad/s, is from another."""
+        # as the firmware holds them, so that both choose the same gait
         motion = np.round([[g.speed_m_s, g.turn_rate_rad_s] for g in self.gaits], 3)
         off = (motion - [speed_m_s, turn_rate_rad_s]) * [1.0, lever_m]
+        # rounded, so that images of one gait are equally far and the first of them wins
         return np.asarray(np.hypot(*off.T).round(9))
 
     def to_dict(self) -> dict[str, Any]:

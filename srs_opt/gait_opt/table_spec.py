@@ -34,6 +34,7 @@ class TableSpec:
         """Return the robot with the load."""
         if not self.load:
             return robot
+        # accelerating at a is, by d'Alembert, like rolling on wheels whose friction is larger by a/g
         return replace(robot, friction_tangential=(1 + self.load) * robot.friction_tangential)
 
 

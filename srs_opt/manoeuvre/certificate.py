@@ -80,6 +80,7 @@ def certify(run: Integrator, task: Task, plan: ValvePlan) -> tuple[Certificate, 
     # the finer motion's own error is at most this share of the difference of the two
     error = float(np.hypot(*apart[:2]) + abs(apart[2])) / MANOEUVRE_CERTIFICATE.ratio
     shot = Shot(plan, fine.time_s, seen_states(run, fine))
+    # the whole tolerances: the optimization kept inside of them for ticks and errors
     rows = RowMaker(run, task, inside=1.0)
     end = float(rows.end_values(shot).min())
     space = float(rows.space_values(shot, np.arange(fine.time_s.size)).min(initial=np.inf))

@@ -35,6 +35,7 @@ class RowMaker:
         self.run, self.task = run, task
         self.inside = CONSTRAINT.inside if inside is None else inside
         length = run.robot.length_m
+        # a certificate takes off the measured error instead
         self.spare_m = CONSTRAINT.spare * length if self.inside < 1 else 0.0
         # all rows are lengths, so that one penalty and one tolerance serve them all
         self.lever_m, self.bend_m2 = CONSTRAINT.lever * length, CONSTRAINT.bend * length * length
@@ -148,6 +149,7 @@ class RowMaker:
         distance = np.hypot(*away.T)
         by_unknowns = np.zeros((looked.size, 0))
         if shot.sensitivity is not None:
+            # at the start itself there is no direction
             toward = -away / np.maximum(distance, 1e-9)[:, None]
             by_unknowns = np.einsum("nk,nkm->nm", toward, shot.sensitivity[looked, :2])
             by_unknowns = np.column_stack([by_unknowns, np.zeros(looked.size)])

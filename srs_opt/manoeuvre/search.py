@@ -101,6 +101,7 @@ def find(
     rng = np.random.default_rng(seed)
     spreads = MANOEUVRE_SEARCH.perturbations_s
     for k in range(perturbations):
+        # every other perturbation is of the best, the rest of all in turn
         base = pool[k // 2 % len(pool)] if k % 2 else pool[0]
         found = solver.solve(
             perturbed(task, base.plan, rng, spreads[k // 2 % len(spreads)]),
@@ -111,6 +112,7 @@ def find(
         if found.merit < pool[0].merit:
             tell(f"perturbation {k + 1} of {perturbations}: {_word(found, satisfied_m)}")
         pool = sorted([*pool, found], key=_merit)[: MANOEUVRE_SEARCH.pool]
+    # a tick moves the end by less than the rougher steps err
     fine = Solver(run, task, MANOEUVRE_SEARCH.fine_step_s)
     answers = []
     for candidate in pool[:2]:
@@ -145,6 +147,7 @@ def perturbed(task: Task, plan: ValvePlan, rng: np.random.Generator, by_s: float
     if not task.pressure_is_free:
         pressure = plan.pressure_kpa
     moved = plan.with_times(times, plan.duration_s * stretch, float(pressure))
+    # switches that were moved may have passed each other
     rows = tuple(ValveRow(row.states, tuple(sorted(row.times_s))) for row in moved.rows)
     return playable(task, replace(moved, rows=rows).trimmed())
 

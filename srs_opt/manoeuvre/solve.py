@@ -109,6 +109,7 @@ class Solver:
                 )
             else:
                 reach *= MANOEUVRE_SOLVER.step_fractions[-1] * 4
+            # a pulse that has shrunk to the dwell holds up all later steps
             merged = self._without_short_pulses(best)
             if merged is not None:
                 best = merged
@@ -154,6 +155,7 @@ class Solver:
         low[n], high[n] = -4 * reach, 4 * reach
         if task.longest_s is not None:
             high[n] = min(high[n], max(task.longest_s - plan.duration_s, low[n]))
+        # a linear step must not take the whole manoeuvre away
         low[n] = max(low[n], 0.05 - plan.duration_s)
         span = MANOEUVRE_SOLVER.pressure_kpa_per_s * reach
         low[n + 1] = np.clip(bounds.pressure_kpa[0] - plan.pressure_kpa, -span, span)

@@ -56,6 +56,7 @@ def starts(solver: Solver, gaits: Sequence[Gait], count: int, seed: int) -> list
     for candidate in judged:
         if len(kept) == count:
             break
+        # starts of like merit are taken for one, so that the solver's time goes to different ones
         if all(abs(candidate.merit - k.merit) > WAVE_START.same_merit * abs(k.merit) for k in kept):
             kept.append(candidate)
     return kept

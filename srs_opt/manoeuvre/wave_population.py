@@ -73,6 +73,7 @@ class Family:
     def plan(self, genes: np.ndarray) -> ValvePlan:
         """Return what the valves do, playable, with what the task's end asks for."""
         phase, lag, later_lag, offset, later_offset, pressure, time = genes[WAVE_POPULATION.knots :]
+        # bounded: a gene that runs away must not make a motion of hours
         played = self.played_s * math.exp(min(time, 1.0))
         at = np.linspace(0.0, played, WAVE_POPULATION.instants)
         share = at / played
