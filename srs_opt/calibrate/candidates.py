@@ -98,6 +98,7 @@ def entry_sd(form: Form, fit: Fit) -> dict[str, float]:
                 change = math.remainder(change, 2 * math.pi)
             jacobian[i, j] = change / (2 * h)
     variances = np.diag(jacobian @ fit.covariance[np.ix_(own, own)] @ jacobian.T)
+    # rounding can leave a variance just below zero
     return {k: float(math.sqrt(max(v, 0.0))) for k, v in zip(keys, variances)}
 
 

@@ -142,9 +142,11 @@ def _off_parabola(points: Array, reach: int) -> tuple[Array, np.ndarray]:
     def summed(data: Array, power: int) -> Array:
         return np.asarray(correlate1d(data, others * lag**power, axis=0, mode="constant"))
 
+    # all parabolas at once: sums over neighbours are correlations with powers of the lag
     moments = [summed(weight, k) for k in range(5)]
     normal = np.stack([np.stack([moments[i + j] for j in range(3)], axis=-1) for i in range(3)], axis=-2)
     count = moments[0]
+    # a parabola is asked between its neighbours, not beyond them
     both_sides = (correlate1d(weight, (lag < 0) * 1.0, axis=0, mode="constant") >= 1) & (
         correlate1d(weight, (lag > 0) * 1.0, axis=0, mode="constant") >= 1
     )

@@ -52,6 +52,7 @@ def coloured(noise: Noise, trials: Sequence[Trial], residuals: Sequence[np.ndarr
     best = minimize(of, start, method="Nelder-Mead", options=options)
     white, walk, time = np.exp(best.x)
     most_walk_m = max(COLOURED_NOISE.most_correlated * noise.white_sd_m, COLOURED_NOISE.most_correlated_m)
+    # no camera errs that much: what shows is the model's misfit
     if white > COLOURED_NOISE.most_white_growth * noise.white_sd_m or walk > most_walk_m:
         return noise
     return replace(noise, white_sd_m=float(white), correlated_sd_m=float(walk), correlation_s=float(time))
@@ -102,6 +103,7 @@ def _deviance(noise: Noise, data: Sequence[_Distances]) -> float:
         owner = np.nonzero(seen.T)[0] if noise.correlated_sd_m > 0 else np.nonzero(seen)[1]
         for k in range(channels):
             own = white[owner == k]
+            # too few values for all that is free in them
             if len(own) <= 2 * size:
                 continue
             both = own.T @ own

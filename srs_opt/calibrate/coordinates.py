@@ -87,6 +87,7 @@ def base_coordinates(robot: Robot) -> tuple[Coordinate, ...]:
         if name in free or name in SCATTER_SD
     ]
     low, high = (math.log(v / robot.friction_speed_m_s) for v in PRIOR.friction_speed_range_m_s)
+    # the range's half width as a standard deviation about its middle, in logarithms
     speed = Coordinate(FRICTION_SPEED, prior_sd=(high - low) / 2, start=(high + low) / 2, lower=low - 0.2)
     return (*chosen, speed)
 

@@ -186,6 +186,7 @@ class Model:
 
     def _set(self, function: ZeroCopy, values: Values, conditions: Conditions) -> None:
         coordinates, bench, now = function.arguments
+        # the buffer still holds the last point: what this one does not name goes back to its default
         coordinates[0] = self._defaults
         for name, value in values.items():
             coordinates[0, self._column[name]] = value

@@ -64,6 +64,7 @@ class NormalEquations:
         """
         if held is not None or damping:
             return self._eliminate(inflation, held, damping)
+        # screens, fits and tests ask for the same inflation again and again
         if inflation not in self._known:
             self._known[inflation] = self._eliminate(inflation, None, 0.0)
         return self._known[inflation]
@@ -87,6 +88,7 @@ class NormalEquations:
         if held is not None:
             free = np.isnan(held)
             move = np.where(free, 0.0, held)
+            # the quadratic form where the held scatter has moved: its part of the gradient changes, too
             matrix[-1, -1] += move @ inner @ move - 2 * move @ cross[:, -1]
             matrix[:-1, -1] -= move @ cross[:, :-1]
             matrix[-1, :-1] = matrix[:-1, -1]
@@ -194,6 +196,7 @@ def trial_normal_equations(
     raw = both.T @ both
     left = both[:, size - 1]
     if own is not None and own_sd is not None:
+        # scaled to unit diagonal: shifts, turns and waves have sizes of their own
         scale = 1 / np.sqrt(np.maximum(np.diag(raw)[size:], 1e-300))
         inner = raw[size:, size:] * scale[:, None] * scale + np.diag((scale / own_sd) ** 2)
         # columns that were nowhere seen have no part in anything
@@ -264,6 +267,7 @@ def bounded_solve(
     chosen = list(chosen)
     solution = solve(total, chosen, precision, offset)
     bound = lower[chosen]
+    # mostly no bound is active
     if np.all(solution.step >= bound):
         return solution
     from scipy.optimize import lsq_linear
@@ -279,6 +283,7 @@ def bounded_solve(
     factor = root[:, None] * vectors[:, kept].T
     target = (vectors[:, kept].T @ (scale * g)) / root
     bounds = bound / scale, np.full(len(chosen), np.inf)
+    # an active-set method ends on the bounds themselves, an interior one only near
     found = lsq_linear(factor, target, bounds, method="bvls", tol=1e-14)
     free = [k for k, held in zip(chosen, found.active_mask) if held == 0]
     covariance = np.zeros((len(chosen), len(chosen)))

@@ -144,6 +144,7 @@ def geodesic_move(
     rest = [g.eliminated(inflation).matrix.copy() for n, g in equations.items() if n not in bent]
     for matrix in rest:
         matrix[:-1, -1] = matrix[-1, :-1] = 0.0
+    # a correction of second order knows neither bounds nor the priors' pull; the step after it does
     free = tuple(replace(c, lower=-math.inf, start=point.values[c.name]) for c in coordinates)
     turn = _solved(free, [*(e.matrix for e in parts.values()), *rest], point, damping).step
     turns = {n: e.back[:, -1] - e.back[:, :-1] @ turn for n, e in parts.items()}
@@ -154,6 +155,7 @@ def geodesic_move(
     )
     share = 0.5 * min(1.0, OBJECTIVE.most_acceleration * length / max(size, 1e-300))
     lower = np.array([c.lower - point.values[c.name] for c in coordinates])
+    # half the acceleration: the Taylor series' second term
     step = np.maximum(move.step + share * turn, lower)
     scatter = {n: _within(equations[n], b + share * turns.get(n, 0.0)) for n, b in move.scatter.items()}
     return Move(step, scatter, move.promised)
@@ -175,6 +177,7 @@ def _held(
 ) -> np.ndarray:
     """Return the moves of what leaves its limits, or is held there and drawn further out; else NaN."""
     at = normal.scatter_now + moved
+    # clipped to the limit, but for rounding
     at_limit = np.abs(at) >= OBJECTIVE.most_scatter_sd * normal.scatter_sd * (1 - 1e-9)
     outwards = (moved != free) | (normal.pull(step, moved, inflation) * at > 0)
     return np.where(at_limit & outwards, moved, np.nan)

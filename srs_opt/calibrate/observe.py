@@ -141,6 +141,7 @@ def predict(
     if nodes.marker_lag_s == 0 or markers == 1:
         return _at_once(model, trial, nodes, values, coordinates, centre_only=centre_only)
     frames, at_once = trial.time_s.size, replace(nodes, marker_lag_s=0.0)
+    # all markers at all their times, then of each what was seen at its own: one call of the compiled picture
     later = nodes.marker_lag_s * np.arange(markers)[:, None]
     every = replace(trial, time_s=(trial.time_s + later).ravel())
     seen = _at_once(model, every, at_once, values, coordinates, centre_only=centre_only)
@@ -210,6 +211,7 @@ def _at_once(
         jacobian[:, :, k] += (by_bend @ linear(nodes.time_s, began.shape, at))[..., 0]
     jac_camera = by_camera.reshape(frames, -1, seen).transpose(0, 2, 1)
     velocity = _velocity(nodes, layout, rate, at)
+    # what all do that only shift time: delays, clocks, markers seen late
     in_time = jac_pose @ velocity[0][..., None] + jac_shape @ velocity[1][..., None]
     later = (by.clock_s - by.delay_s)[0]  # a delay of the valves shifts the motion in time
     jacobian[:, :, later != 0] += in_time * later[later != 0]

@@ -156,6 +156,7 @@ def unidentifiable(coordinates: list[Coordinate], covariance: np.ndarray) -> tup
         if math.sqrt(max(value, 0.0)) >= CALIBRATION_REPORT.uninformed_share:
             parts = [(abs(w), w, c.name) for w, c in zip(vector, coordinates) if abs(w) > 0.3]
             parts.sort(reverse=True)
+            # in logarithms a direction is a product of powers; its sign is that of the largest part
             sign = math.copysign(1.0, parts[0][1])
             words = [name if w * sign > 0 else f"1/{name}" for _, w, name in parts]
             found.append(" * ".join(words))

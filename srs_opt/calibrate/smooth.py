@@ -40,6 +40,7 @@ def smooth_terms(
         across = quarter_turn(forwards)
         place = np.linspace(-1, 1, markers) if markers > 1 else np.zeros(1)
         for wave in gait_waves(trial):
+            # no more shapes than the markers tell apart
             for order in range(min(SMOOTH_ERRORS.shapes, markers)):
                 shape = np.polynomial.Legendre.basis(order)(place)
                 columns += [_shift(wave, d, markers, shape) for d in (forwards, across)]

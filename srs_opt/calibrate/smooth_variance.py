@@ -62,6 +62,7 @@ def smooth_part(
     """
     precision, offset = priors(coordinates, point)
     loose = np.array([SMOOTH_ERRORS.free_sizes * c.typical for c in coordinates])
+    # a wide prior, so that the determinant exists where the data say nothing of an effect
     precision = np.where(precision > 0, precision, loose**-2.0)
     free = range(len(coordinates))
     count = sum(g.count for g in equations.values())

@@ -170,6 +170,7 @@ def _scheduled(schedule: Schedule, segments: int, end_s: float, trial: Trial) ->
 
 def conditions_of(trial: Trial) -> Conditions:
     """Return the trial's conditions as the equations see them."""
+    # effects that depend on the frequency need a number where there is none
     return Conditions(trial.pressure_kpa, trial.frequency_hz or 1.0, trial.tether)
 
 
@@ -240,6 +241,7 @@ class TrialRun:
         """Integrate one cycle on the mesh that served it last time, refined where that is too coarse."""
         phases = (*np.round(piece.duration_s, 7), *piece.valve.ravel())
         tolerance, number = key
+        # this cycle the last time it was simulated, else the cycle before it
         kept = self.meshes.get(key) or self.meshes.get((tolerance, number - 1))
         mesh = _fitted(kept, piece.duration_s, phases) or Mesh.uniform(piece.duration_s, TRIAL.first_step_s)
         request = StepRequest(kernel, x, mesh, piece.valve, p)
@@ -280,6 +282,7 @@ def _cycles(timeline: Timeline, period_s: float) -> list[Timeline]:
         if end >= boundary - 1e-9 or k - start >= 60 or k == ends.size - 1:
             pieces.append(timeline.part(slice(start, k + 1)))
             start = k + 1
+            # the next whole period, where this end is one but for rounding, too
             boundary = (math.floor((end + 1e-9) / period_s) + 1) * period_s
     return pieces
 

@@ -213,6 +213,7 @@ class Trials:
 
     def _place(self, name: str, request: Request) -> Place:
         default = self.model.default
+        # a value at its default is the same place whether a point names it or not
         values = {k: v for k, v in request.point.of_trial(name).items() if v != default(k)}
         return request.rough, values
 
@@ -268,6 +269,7 @@ class Trials:
             # an integration on the edge of breaking down ends, and has no derivatives: no place for a fit
             return NoAnswerError(f"trial {name}: the motion has no finite derivatives there")
         if self.keeps and not served:
+            # single precision: half the memory, and a derivative's eighth digit decides nothing
             self._jacobian[name][wide] = KeptJacobian(here, names, jacobian.astype(np.float32))
             self._new_jacobians.add((name, wide))
         if extra is not None:

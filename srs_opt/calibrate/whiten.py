@@ -34,6 +34,7 @@ class Whitening:
         from scipy.linalg import cholesky_banded
 
         channel, frame = np.nonzero(seen.T)
+        # coordinate by coordinate, each in time: the process is one per coordinate
         self._rows = frame * seen.shape[1] + channel
         first = np.append(True, channel[1:] != channel[:-1])
         # where the next coordinate begins the difference is negative and not used: `keep` is 0 there
@@ -67,6 +68,7 @@ class Whitening:
             return np.asarray(chosen / self.sd_m)
         from scipy.linalg.lapack import dtbtrs
 
+        # LAPACK's own order, or it would copy
         chosen = np.asfortranarray(chosen)
         differences = chosen.copy(order="F")
         differences[1:] -= self._keep[1:, None] * chosen[:-1]

@@ -40,6 +40,7 @@ class Angles:
         free = [k for k, c in enumerate(lin.coordinates) if k >= lin.fitted or c.name in sizes]
         self._names = {lin.coordinates[k].name: n for n, k in enumerate(free)}
         self._lower = [lin.coordinates[k].lower for k in free]
+        # the fitted first, as `projected` takes them
         order = [*fitted, *free]
         total = sum_eliminated(lin.telling, lin.variance_inflation)[np.ix_(order, order)]
         precision, _ = priors([lin.coordinates[k] for k in order], lin.point)

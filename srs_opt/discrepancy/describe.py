@@ -169,6 +169,7 @@ def _fitted(search: Search, null: Fit, settings: DescriptionSettings) -> list[Hy
     screens = []
     for diagnostics in (brief.examine(first), brief.examine(bench)):
         screens.append([(diagnostics.linearisation, score) for score in diagnostics.scores])
+    # in turn from both screens: which of them is right is not known
     for lin, score in itertools.chain.from_iterable(zip(*screens)):
         if len(found) < settings.refits:
             attempt(lin, score)

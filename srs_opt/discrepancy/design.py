@@ -80,6 +80,7 @@ def next_experiment(
     if not sure:  # trials cost a simulation each
         new = proposals(experiment, trials)
         both = [_trial_gains(experiment, a, b, new) for a, b in ((first, second), (second, first))]
+        # whichever hypothesis is true: the less of both
         options |= {what: min(gains[what] for gains in both) for what in new}
     what, gain = max((sure or options).items(), key=lambda item: item[1])
     names = tuple(" + ".join(h.names) or NOTHING for h in rivals)

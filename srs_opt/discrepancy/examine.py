@@ -100,6 +100,7 @@ def examined(
     start = size - lin.fitted
     families = [[start + k for k in g.columns] for g in groups] + tested
     serial = np.array([g.serial for g in lin.equations.values() if g.scattered])
+    # a stream of its own: the draws do not depend on what else is drawn from the seed
     detection = detect(score, covariance, families, serial, np.random.default_rng([seed, 17]))
     return Diagnostics(hypothesis, lin, detection, groups, tuple(screen(lin, candidates)))
 

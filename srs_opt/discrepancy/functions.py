@@ -180,5 +180,6 @@ def _room(points: np.ndarray, time_s: np.ndarray) -> list[np.ndarray]:
     x, y = points[..., 0], points[..., 1]
     zero, one = np.zeros_like(x), np.ones_like(x)
     t = np.broadcast_to(time_s[:, None], x.shape)
+    # an affine map of the picture, and its drift
     pairs = [(x, zero), (zero, x), (y, zero), (zero, y), (one, zero), (zero, one), (t, zero), (zero, t)]
     return [np.stack(pair, axis=2).reshape(len(time_s), -1) for pair in pairs]

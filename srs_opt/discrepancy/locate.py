@@ -85,6 +85,7 @@ def stages(null: Hypothesis, fitted: Sequence[Hypothesis]) -> tuple[Place, ...]:
             if c.place is not None and c.form.effect.place is not None:
                 where += f", {c.form.effect.place.name} {c.place}"
             gain = (null.deviance - h.deviance) / h.parameters
+            # ordered by what they close: the first of a kind is its best
             found.setdefault(c.form.effect.kind, Place(where, c.form.effect.what, gain, 0.0))
     return tuple(found.values())
 

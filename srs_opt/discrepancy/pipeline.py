@@ -175,6 +175,7 @@ def diagnose(
     clean = cleaned(dataset)
     dataset = clean.dataset
     split = split_trials(dataset.trials)
+    # from the open trials alone: nothing of the sealed ones may enter a fit
     noise = noise_of(replace(dataset, trials=split.open))
     if not split.enough:
         tell("choosing what to record")
@@ -213,6 +214,7 @@ def _examine(
         split = split.without(apart)
     searched = null.detection.p_value < settings.detected
     best, fitted = search.run(null) if searched else (null, [null.hypothesis])
+    # the search may have found smooth errors: calibration alone is judged under the same noise
     if search.experiment.noise != experiment.noise:
         null = null if best is null else search.examine(search.again(null.hypothesis))
         experiment = search.experiment

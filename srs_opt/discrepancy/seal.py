@@ -115,6 +115,7 @@ def open_seal(
     second = first if after is before else sealed_residuals(experiment, after, trials)
     correlated_m, length_m = experiment.noise.correlated_sd_m, experiment.model.robot.length_m
     blocks = _blocks(trials, [first, second])
+    # a stream of its own: the draws do not depend on what else is drawn from the seed
     rng = np.random.default_rng([seed, 23])
     total = blocks.sum(axis=0)
     sizes = _sizes(total, correlated_m)
@@ -145,6 +146,7 @@ def odd_sealed(gap: Gap | None, settings: AdequacySettings = ADEQUACY) -> dict[s
     if gap is None or gap.trials < 2:
         return {}
     left = gap.after.by_trial
+    # of two trials the one that is missed less is the measure
     usual = float(np.median(list(left.values()))) if gap.trials > 2 else min(left.values())
     limit = max(settings.off_m, settings.off_times * max(usual, gap.floor_error_m))
     off = {n: m for n, m in left.items() if m > limit}

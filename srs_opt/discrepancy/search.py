@@ -361,6 +361,7 @@ class Search:
             rest = tuple(c for c in have if c not in small)
             smaller = self.fit(rest, current.hypothesis.fit.point)
             return current if smaller is None else self._pruned(self.examine(smaller))
+        # the last was just added because its gain was significant
         for dropped in have[:-1]:
             if current.hypothesis.firmness(dropped) > SEARCH.certain_sd:
                 continue

@@ -78,6 +78,7 @@ def gait_of(trial: Trial) -> Hashable:
     applied = 0
     if trial.applied is not None:
         drive = trial.applied
+        # what was applied tells a drive, whatever the file is called
         applied = crc32(b"".join(a.tobytes() for a in (drive.time_s, drive.state, drive.pressure_kpa)))
     return (trial.kind, schedule, applied, *(round(v, 6) for v in wave))
 

@@ -152,6 +152,7 @@ def _constants(condition: str, pressure: float | None, fits: list[StepFit]) -> T
     correlations = [
         f.covariance[1, 2] / max(np.sqrt(f.covariance[1, 1] * f.covariance[2, 2]), 1e-300) for f in fits
     ]
+    # short of 1, or the covariance would not be positive definite
     mixed = float(np.clip(np.mean(correlations), -0.999, 0.999)) * s.sd * q.sd
     covariance = np.array([[s.sd**2, mixed], [mixed, q.sd**2]])
     one, two = time_constants(s.value, q.value, covariance)

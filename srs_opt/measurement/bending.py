@@ -117,6 +117,7 @@ def _pairs(tests: Sequence[StepTest], fits: Sequence[StepFit], robot: Robot) -> 
     lifted: dict[tuple[int, float, bool], list[StepFit]] = {}
     for fit in fits:
         if fit.condition == "lifted" and fit.segment is not None:
+            # left and right apart: constraint layers are not even
             lifted.setdefault((fit.segment, fit.pressure_kpa, fit.c0_1_m > 0), []).append(fit)
     pairs = []
     for test, fit in zip(tests, fits):
@@ -125,6 +126,7 @@ def _pairs(tests: Sequence[StepTest], fits: Sequence[StepFit], robot: Robot) -> 
             continue
         amplitude = float(np.mean([abs(t.c0_1_m) for t in twins]))
         sd = float(np.sqrt(np.mean([t.c0_sd_1_m**2 for t in twins]) / len(twins)))
+        # readings without noise would weigh without bound
         noise = max(float(np.mean([t.residual_sd_1_m for t in twins])), 1e-4 * amplitude)
         pairs.append(_Pair(test, amplitude, sd, noise))
     interior = [p for p in pairs if p.ground.segment not in (1, robot.segments)]
@@ -195,6 +197,7 @@ class _Problem:
             )
             run = Integrator(robot)
             valve = np.zeros((robot.segments, 1))
+            # one segment pressed to the left, the others vented; steps to the right are mirrored
             valve[(test.segment or 1) - 1] = 1.0
             end = np.array([max(float(test.time_s[-1]), 0.05)])
             timeline = Timeline.constant(end, valve, test.pressure_kpa, SINGLE_STEP_HZ)

@@ -92,6 +92,7 @@ def link_positions(chain: Chain, q: Array) -> Array:
     gaps = chain.gap_length_m / 2 * (unit_vectors(theta[..., :-1]) + unit_vectors(theta[..., 1:]))
     steps = gaps + chain.segment_length_m * length[..., None] * unit_vectors(middle)
     relative = np.concatenate([np.zeros((*steps.shape[:-2], 1, 2)), np.cumsum(steps, axis=-2)], axis=-2)
+    # links of equal mass: their mean place is the centre of mass
     points_m: Array = q[..., None, :2] + relative - relative.mean(axis=-2, keepdims=True)
     return points_m
 

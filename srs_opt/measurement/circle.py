@@ -61,6 +61,7 @@ def fit_circle(points_m: Array) -> Circle:
     start = taubin(unit)
     fit = least_squares(gaps, start, method="lm", x_scale=[1.0, 1.0, 1.0])
     a, b, radius = fit.x
+    # ten thousand times the track's size is a line
     if not fit.success or not np.isfinite(fit.x).all() or radius > 1e4:
         raise NoAnswerError("the points lie on a straight line: no circle fits them")
     # least_squares' cost is half the sum of squares

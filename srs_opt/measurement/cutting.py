@@ -39,6 +39,7 @@ def cut_trial(
     time = source.time_s - start
     duration = row.number("duration_s", report, math.inf)
     begin = float(time[0]) if onset.moving else 0.0
+    # half a frame of slack: a frame belongs to the trial whatever rounding does to its label
     window = (time >= begin - 0.5 * step) & (time < begin + duration - 0.5 * step)
     if window.sum() < 4:
         raise InputError(f"{source.source}: the valves start at {start:g} s, after the take's end")

@@ -114,6 +114,7 @@ def _write_track(trial: Trial, path: Path) -> None:
     flat = points.reshape(len(trial.time_s), -1)
     table = np.column_stack([trial.time_s, flat])
     columns = track_columns(TAIL_TO_HEAD if points.ndim == 3 else CENTRE_OF_MASS, flat.shape[1] // 2)
+    # micrometres and microseconds: far below any camera's noise
     template = ",".join(["%.6f"] * table.shape[1])
     lines = [(template % tuple(row)).replace("nan", "") for row in table]
     write_text(path, "\n".join([",".join(columns), *lines]) + "\n")

@@ -68,6 +68,7 @@ def head_first(
 
 def _by_phase(time_s: Array, tracks: Array, frequency_hz: float, lag_rad: float) -> bool | None:
     """Tell by the mean phase step of neighbouring bends; None where it cannot be told."""
+    # a lag near 0 or pi looks alike from both ends
     if frequency_hz <= 0 or abs(math.sin(lag_rad)) < 0.1 or tracks.shape[1] < 4:
         return None
     waves = []

@@ -34,6 +34,7 @@ def find_chain(chain: Chain, positions: Array) -> np.ndarray | None:
     while stack and budget:
         budget -= 1
         path, cost = stack.pop()
+        # costs only grow along a path: this one cannot win any more
         if cost >= best[0]:
             continue
         if len(path) == chain.markers:
@@ -42,6 +43,7 @@ def find_chain(chain: Chain, positions: Array) -> np.ndarray | None:
         last = len(path) - 1
         for j in neighbours[last][path[-1]]:
             if j not in path:
+                # of rows that are spaced alike the straighter one wins
                 turn = _turn(positions, path, int(j), corners)
                 if turn < LABELS.most_turn_rad:
                     stack.append(((*path, int(j)), cost + misfit[last, path[-1], j] + 0.05 * turn))

@@ -54,6 +54,7 @@ def ground_axes(points_m: Array, up: str = "auto") -> tuple[Array, Array]:
 def _thinnest(points: Array) -> Array:
     """Return the direction in which the positions spread least, ghosts off the plane left out."""
     _, _, axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
+    # a robust start: a few ghosts off the plane can tilt the least-squares one
     normal = min([*np.eye(3), axes[2]], key=lambda n: _spread(points @ n))
     for _ in range(10):
         height = points @ normal

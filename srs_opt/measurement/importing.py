@@ -172,6 +172,7 @@ def import_takes(
         name=name,
         robot=robot,
         rate_hz=takes[0].rate_hz,
+        # more digits are not known
         marker_sd_m=float(f"{sd:.3g}"),
         trials=tuple(trials),
         bench=Bench(checks=checks),

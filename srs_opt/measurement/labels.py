@@ -110,6 +110,7 @@ def follow(chain: Chain, cloud: Array, start: int, order: np.ndarray) -> np.ndar
     owners[start] = np.where(np.isfinite(cloud[start, np.maximum(order, 0), 0]), order, -1)
     first = take(cloud[start : start + 1], owners[start : start + 1])[0]
     for frames in (range(start + 1, len(cloud)), range(start - 1, -1, -1)):
+        # a link that the first frame does not show is looked for in a wider circle
         last, age = first.copy(), np.where(np.isfinite(first[:, 0]), 0, 10)
         for frame in frames:
             owners[frame] = _found_again(chain, cloud[frame], last, age)

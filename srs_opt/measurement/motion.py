@@ -166,6 +166,7 @@ def _blocks(time: np.ndarray, end: float, period: float, cycles: int) -> np.ndar
     """Return the block (whole cycles from the end; half cycles when there are few) of every sample."""
     count = min(cycles if cycles >= STEADY.least_blocks else 2 * cycles, STEADY.most_blocks)
     number = np.floor((end - time) / period * count / cycles + 1e-9).astype(int)
+    # samples on the outer edges belong to the first and last block
     interval: np.ndarray = np.clip(number, 0, count - 1)
     return interval
 

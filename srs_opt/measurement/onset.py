@@ -159,6 +159,7 @@ def _fitted(
     z = points[..., 0] + 1j * points[..., 1]
 
     def gaps(p: Array) -> Array:
+        # p: start, factor on C_0, factor on both time constants of (14)
         kappa = p[1] * first_curvatures(robot, wave, time - p[0], p[2])
         return _shape_gaps(chain, kappa, z)
 
@@ -185,6 +186,7 @@ def _correlated(residual: Array, frames: int) -> float:
     """Return by how much correlation from frame to frame raises a variance: (1 + r)/(1 - r), r at lag one."""
     rows = residual.reshape(2, frames, -1)
     r = float((rows[:, 1:] * rows[:, :-1]).sum() / max(float((rows**2).sum()), 1e-30))
+    # 0.98: with r = 1 nothing would be known at all
     r = min(max(r, 0.0), 0.98)
     return (1 + r) / (1 - r)
 
@@ -212,6 +214,7 @@ def _drifts(flat: Array, sd: float) -> bool:
         return False
     steps = np.arange(len(flat)) - (len(flat) - 1) / 2
     trend = steps @ flat / (steps @ steps)
+    # of noise alone: slopes over their deviations, squared, one per coordinate
     chi2 = float((trend**2).sum() * (steps @ steps)) / max(sd, 1e-9) ** 2
     drifts: bool = chi2 > flat.shape[1] + ONSET.drift_sd * np.sqrt(2 * flat.shape[1])
     return drifts

@@ -61,6 +61,7 @@ def likely_start_s(
         if expected is None:
             misfits.append(math.inf)
             continue
+        # the model itself is uncertain by how much the early cycles fall short
         spread = np.sqrt(sd**2 + (RUN_IN.model_share * (1 - expected)) ** 2)
         # -2 log likelihood with its normalization, because the candidates' spreads differ
         misfits.append(float(np.sum(((seen - expected) / spread) ** 2 + 2 * np.log(spread))))

@@ -103,6 +103,7 @@ def shape_from_markers(
     if prior_sd_1_m is None:
         prior_sd_1_m = SHAPE.prior_bend_rad / chain.segment_length_m
     start = first_guess(chain, points)
+    # next to no prior on place and heading, a weak one on curvature
     prior = np.array(
         [SHAPE.far_m**-2, SHAPE.far_m**-2, SHAPE.far_rad**-2, *[prior_sd_1_m**-2] * (chain.links - 1)]
     )
@@ -119,6 +120,7 @@ def shape_from_markers(
 def residuals(chain: Chain, points: Array, q: Array) -> Array:
     """Return measured minus modelled coordinates, zero where lost, shape (T, 2 M)."""
     gap = points - marker_positions(chain, q)
+    # a lost marker pulls at nothing
     return np.where(np.isfinite(gap), gap, 0.0).reshape(len(points), -1)
 
 
@@ -174,6 +176,7 @@ def first_guess(chain: Chain, points: Array) -> Array:
     turned = _turned(chain, along)
     # the pseudo-inverse gives the least squares' solution of least curvature
     curvature = np.diff(direction, axis=1) @ np.linalg.pinv(np.diff(turned, axis=0)).T
+    # every chord tells the tail's heading, less what the curvatures have turned it by
     tail = (direction - curvature @ turned.T).mean(axis=1)
     q = np.column_stack([np.zeros((len(filled), 2)), np.zeros(len(filled)), curvature])
     q[:, 2] = np.unwrap(tail - headings(chain, q)[:, 0])

@@ -143,6 +143,7 @@ def likeliest_intensity(problem: _Problem) -> Intensity:
     state = {"z": _start(part)}
 
     def cost(log10: np.ndarray) -> float:
+        # a simplex may wander: its intensities stay numbers
         spread = Intensity(*(10.0 ** np.clip(log10, -8, 12))).per_component(part.chain)
         z, (diagonal, coupling) = _most_probable(
             part, spread, state["z"], iterations=SMOOTHER.tuning_iterations
@@ -304,6 +305,7 @@ def _marginals(diagonal: Array, coupling: Array) -> Array:
         gains[k] = inverse[k] @ coupling[k]
         inverse[k + 1] = np.linalg.inv(diagonal[k + 1] - coupling[k].T @ gains[k])
     covariance = inverse
+    # in place from the end: entry k needs k + 1 and its own filtered value only
     for k in range(frames - 2, -1, -1):
         covariance[k] = inverse[k] + gains[k] @ covariance[k + 1] @ gains[k].T
     symmetric: Array = (covariance + covariance.transpose(0, 2, 1)) / 2

@@ -90,6 +90,7 @@ def fit_steady(time_s: Array, tracks: Complex, period_s: float, harmonics: int |
     from scipy.optimize import minimize_scalar
 
     harmonics = STEADY.harmonics if harmonics is None else harmonics
+    # time from the middle, so that turn rate and place do not trade off
     origin = float(time_s.mean())
     t = time_s - origin
     orders = np.arange(-harmonics, harmonics + 1)

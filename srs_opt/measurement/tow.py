@@ -75,6 +75,7 @@ def _line(tests: list[TowTest]) -> TowLine | None:
         return None
     speed = np.abs([t.speed_m_s for t in tests])
     force = np.array([abs(t.force_n) for t in tests])
+    # one speed tells no slope
     several = float(np.ptp(speed)) > 1e-6
     design = np.column_stack([np.ones(len(speed)), speed]) if several else np.ones((len(speed), 1))
     values = np.linalg.lstsq(design, force, rcond=None)[0]
