@@ -77,6 +77,13 @@ def wrapped(angle: Any) -> Any:
     return (angle + math.pi) % (2 * math.pi) - math.pi
 
 
+def turning_angles(points: np.ndarray) -> Array:
+    """Return by how much polylines of points (..., M, 2) turn at their inner points, (..., M - 2), left +."""
+    chords = np.diff(points, axis=-2)
+    heading = np.arctan2(chords[..., 1], chords[..., 0])
+    return np.asarray(wrapped(np.diff(heading, axis=-1)))
+
+
 def distance_along(points: np.ndarray) -> Array:
     """Return the distance (n,) along a polyline of points (n, 2) from the first of them, m."""
     return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])

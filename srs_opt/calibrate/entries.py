@@ -10,6 +10,7 @@ import math
 import numpy as np
 
 from srs_opt.calibrate.data_settings import ENTRY
+from srs_opt.geometry import turning_angles
 from srs_opt.measurement.records import Trial
 
 
@@ -54,9 +55,7 @@ def _swing(trial: Trial) -> tuple[np.ndarray, np.ndarray] | None:
     time = trial.time_s[whole]
     if time.size < ENTRY.least_frames or (time[-1] - time[0]) * trial.frequency_hz < ENTRY.least_cycles:
         return None
-    chords = np.diff(markers[whole], axis=1) @ np.array([1, 1j])
-    # angles from chord to chord as arguments of complex ratios: no unwrapping
-    turns = np.angle(chords[:, 1:] * np.conj(chords[:, :-1]))
+    turns = turning_angles(markers[whole])
     part = np.linspace(-1, 1, time.size)
     trend = np.column_stack([np.ones_like(part), part])
     return time, turns - trend @ np.linalg.lstsq(trend, turns, rcond=None)[0]

@@ -13,9 +13,9 @@ from dart_snake.engine import Snake
 from srs_opt.document import read_json
 from srs_opt.errors import InputError
 from srs_opt.gait import Gait, check_gait
-from srs_opt.geometry import rotate
+from srs_opt.geometry import distance_along, rotate
 from srs_opt.judge.bodies import body_of, pull_of
-from srs_opt.judge.replay import Drift, Phases, length_m, play_blind, whole_step_s
+from srs_opt.judge.replay import Drift, Phases, play_blind, whole_step_s
 from srs_opt.judge.settings import ENGINE, REPLAY, EngineSettings
 from srs_opt.orbit.body import integrator
 from srs_opt.robot import Robot
@@ -111,7 +111,7 @@ def replay_manoeuvre(
     return Played(
         "manoeuvre",
         float(np.hypot(*(there[-1] - here[-1]))),
-        length_m(here),
+        float(distance_along(here)[-1]),
         robot.length_m,
         times - (times[0] if before is not None else 0.0),
         there,

@@ -17,6 +17,7 @@ from dart_snake.engine import Motion, Snake
 from srs_opt.document import read_json
 from srs_opt.errors import InputError
 from srs_opt.gait import Gait
+from srs_opt.geometry import distance_along
 from srs_opt.judge.bodies import body_of, drive_of, pull_of, slope_of
 from srs_opt.judge.settings import AGREEMENT, ENGINE, REPLAY, EngineSettings
 from srs_opt.judge.walls import boxes_of, clearances, solid_region
@@ -185,7 +186,7 @@ def replay(robot: Robot, motion: Mapping[str, Any], settings: EngineSettings = E
     return Replay(
         run["name"],
         float(np.hypot(*(centre[last] - there))),
-        length_m(until),
+        float(distance_along(until)[-1]),
         robot.length_m,
         seen.time_s,
         centre,
@@ -213,11 +214,6 @@ def play_blind(robot: Robot, snake: Snake, phases: Phases) -> tuple[Motion, Arra
     seen = snake.play(curvature, rate, REPLAY.steps_per_row)
     masses = np.array([link.mass_kg for link in snake.body.links])
     return seen, np.stack([seen.x_m @ masses, seen.y_m @ masses], axis=1) / masses.sum()
-
-
-def length_m(way: Array) -> float:
-    """Return the length of a way (n, 2)."""
-    return float(np.hypot(*np.diff(way, axis=0).T).sum())
 
 
 def phases_of(motion: Mapping[str, Any], run: Mapping[str, Any]) -> Phases:

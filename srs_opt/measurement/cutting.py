@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from srs_opt.errors import InputError
-from srs_opt.geometry import rotation_matrix, wrapped
+from srs_opt.geometry import rotation_matrix, turning_angles
 from srs_opt.measurement.chain import Chain
 from srs_opt.measurement.onset import Onset
 from srs_opt.measurement.records import Array, Trial
@@ -81,9 +81,7 @@ def check_rest(trial: Trial, warnings: list[str]) -> None:
     points = trial.markers_m
     if points is None or trial.kind != "gait" or trial.moving:
         return
-    chords = np.diff(points[:3], axis=1)
-    angle = np.arctan2(chords[..., 1], chords[..., 0])
-    bends = np.abs(wrapped(np.diff(angle, axis=1)))
+    bends = np.abs(turning_angles(points[:3]))
     if np.isfinite(bends).any() and float(np.nanmax(bends)) > IMPORT.most_bent_rad:
         warnings.append(
             f"the robot is bent by {np.nanmax(bends):.2g} rad at the valves' start: the fits "

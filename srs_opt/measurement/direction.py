@@ -8,8 +8,8 @@ from itertools import pairwise
 import numpy as np
 
 from srs_opt.errors import InputError
+from srs_opt.geometry import turning_angles
 from srs_opt.measurement.chain import Chain
-from srs_opt.measurement.frequency import bends_of
 from srs_opt.measurement.records import Array
 from srs_opt.measurement.take_settings import DIRECTION
 
@@ -72,7 +72,7 @@ def _by_phase(time_s: Array, tracks: Array, frequency_hz: float, lag_rad: float)
     if frequency_hz <= 0 or abs(math.sin(lag_rad)) < 0.1 or tracks.shape[1] < 4:
         return None
     waves = []
-    for bend in bends_of(tracks).T:
+    for bend in turning_angles(tracks).T:
         seen = np.isfinite(bend)
         if not seen.any() or np.ptp(time_s[seen]) * frequency_hz < DIRECTION.least_cycles:
             return None

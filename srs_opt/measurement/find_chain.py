@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
+from srs_opt.geometry import turning_angles, wrapped
 from srs_opt.measurement.chain import Chain
 from srs_opt.measurement.records import Array
 from srs_opt.measurement.take_settings import LABELS
@@ -25,7 +24,7 @@ def find_chain(chain: Chain, positions: Array) -> np.ndarray | None:
     distance = np.linalg.norm(positions[:, None] - positions[None], axis=2)
     misfit = np.abs(np.nan_to_num(distance, nan=np.inf) / chain.spacing_m[:, None, None] - 1)
     neighbours = [[np.flatnonzero(row < LABELS.chain_tolerance) for row in each] for each in misfit]
-    corners = _corners(chain.straight_m)
+    corners = turning_angles(chain.straight_m)
     best: tuple[float, tuple[int, ...]] = (np.inf, ())
     budget = LABELS.most_paths
     stack: list[tuple[tuple[int, ...], float]] = [
@@ -56,18 +55,12 @@ def symmetric(chain: Chain) -> bool:
     return bool(gap.max() < LABELS.uneven_share * chain.spacing_m.mean())
 
 
-def _corners(row: Array) -> Array:
-    """Return the angles by which a row of positions (M, 2) turns at its inner ones, (M - 2,)."""
-    a, b = np.diff(row[:-1], axis=0), np.diff(row[1:], axis=0)
-    return np.asarray(np.arctan2(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], (a * b).sum(axis=1)))
-
-
 def _turn(positions: Array, path: tuple[int, ...], new: int, corners: Array) -> float:
     """Return by how much the path bends at its end, beyond what the straight robot's markers do there."""
     if len(path) < 2:
         return 0.0
-    here = float(_corners(positions[[path[-2], path[-1], new]])[0]) - float(corners[len(path) - 2])
-    return abs(math.remainder(here, 2 * math.pi))
+    here = float(turning_angles(positions[[path[-2], path[-1], new]])[0]) - float(corners[len(path) - 2])
+    return abs(float(wrapped(here)))
 
 
 def best_start(chain: Chain, cloud: Array, tries: int = 200) -> tuple[int, np.ndarray] | None:

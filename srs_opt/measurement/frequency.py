@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from srs_opt.geometry import turning_angles
 from srs_opt.measurement.records import Array
 from srs_opt.measurement.take_settings import FREQUENCY
 
@@ -24,13 +25,6 @@ class SeenFrequency:
         return gap > FREQUENCY.significant_sd * self.sd_hz and gap * span_s > FREQUENCY.least_phase
 
 
-def bends_of(tracks: Array) -> Array:
-    """Return the angles between neighbouring chords, (T, M - 2), within half a turn; NaN where lost."""
-    chords = np.diff(tracks, axis=1)
-    angle = np.arctan2(chords[..., 1], chords[..., 0])
-    return np.asarray(np.mod(np.diff(angle, axis=1) + np.pi, 2 * np.pi) - np.pi)
-
-
 def seen_frequency(time_s: Array, tracks: Array, nominal_hz: float) -> SeenFrequency | None:
     """Return the frequency whose first harmonics leave least of the bends; None where that tells nothing.
 
@@ -44,7 +38,7 @@ def seen_frequency(time_s: Array, tracks: Array, nominal_hz: float) -> SeenFrequ
     """
     from scipy.optimize import minimize_scalar
 
-    bends = bends_of(tracks)
+    bends = turning_angles(tracks)
     signals = [(time_s[np.isfinite(b)], b[np.isfinite(b)]) for b in bends.T]
     signals = [
         (t, b)
@@ -81,7 +75,7 @@ def seen_frequency(time_s: Array, tracks: Array, nominal_hz: float) -> SeenFrequ
 
 def far_frequency(time_s: Array, tracks: Array, nominal_hz: float) -> float | None:
     """Return the frequency of the bends where it is nowhere near the nominal one (to ask a person)."""
-    bends = bends_of(tracks)
+    bends = turning_angles(tracks)
     whole = bends[np.isfinite(bends).all(axis=1)]
     time = time_s[np.isfinite(bends).all(axis=1)]
     if len(time) < 8 * FREQUENCY.harmonics or not whole.size or not np.ptp(time) > 0:

@@ -8,10 +8,13 @@ from srs_opt.geometry import (
     compose,
     distance_along,
     points_in_room,
+    quarter_turn,
     relative,
     rotate,
     rotate_back,
     rotation_matrix,
+    turning_angles,
+    unit_vectors,
     wrapped,
 )
 from srs_opt.model.kinematics import segment_sagitta
@@ -58,3 +61,18 @@ def test_the_middle_of_a_segment_lies_beside_its_chord(kappa, ratio):
     assert float(ca.evalf(segment_sagitta(ca.SX(kappa), length, gap, ratio))) == pytest.approx(
         right, abs=1e-8
     )
+
+
+def test_a_polyline_turns_by_the_angles_that_it_was_made_of():
+    turns = np.array([0.3, -3.0, 3.1, 0.0])
+    chords = np.linspace(1, 2, 5)[:, None] * unit_vectors(2.0 + np.concatenate([[0.0], np.cumsum(turns)]))
+    line = np.concatenate([np.zeros((1, 2)), np.cumsum(chords, axis=0)])
+    assert turning_angles(np.stack([line, line @ rotation_matrix(1.0).T])) == pytest.approx(
+        np.stack([turns, turns])
+    )
+
+
+def test_a_quarter_turn_is_the_derivative_of_a_unit_vector():
+    angle, step = np.linspace(-4, 4, 9), 1e-6
+    change = (unit_vectors(angle + step) - unit_vectors(angle - step)) / (2 * step)
+    assert quarter_turn(unit_vectors(angle)) == pytest.approx(change, abs=1e-9)
