@@ -106,6 +106,7 @@ def outliers_of(points: Array, time_s: Array) -> np.ndarray:
         # an outlier bends its neighbours' parabolas, too: only the worst nearby is sure
         found = (size >= _largest_nearby(size, reach)) & (size > limit[:, some])
         outlying[:, some] |= found
+        # only where something was left out the parabolas change
         again = found.any(axis=0)
         some = some[again]
         if not some.size:

@@ -76,6 +76,7 @@ def _distances(trial: Trial, residual: np.ndarray) -> _Distances | None:
     track = track_of(trial)
     assert track is not None
     frames = len(trial.time_s)
+    # the predicted places: directions between measured ones would carry the noise
     apart = np.diff((track - residual).reshape(frames, -1, 2), axis=1)
     if apart.shape[1] == 0:
         return None

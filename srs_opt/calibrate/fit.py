@@ -266,6 +266,7 @@ class _Descent:
             moved = _moved(self.point, self.coordinates, move)
             equations = self._measured(moved, stale=True)
             before, after = (self.point, self.equations), (moved, equations)
+            # before the gain is taken: it may exchange the equations of diverging trials
             moved = self._scatter_limited(before, after, inflation)
             # under the inflation before the step: with its own a worse misfit could look like a gain
             gain = now - objective(self.coordinates, equations, moved, inflation)

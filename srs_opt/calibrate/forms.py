@@ -131,6 +131,7 @@ class Form:
             found |= {self.name("x"): size * math.cos(angle), self.name("y"): size * math.sin(angle)}
         if self.point:
             x, y = (float(entry[p.name]) for p in self.point)
+            # a point at the origin has no direction
             away = max(math.hypot(x, y), 1e-6)
             found |= {self.name("x"): size * x / away, self.name("y"): size * y / away}
             found[self.name("log_nearness")] = -math.log(away)

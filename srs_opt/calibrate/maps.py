@@ -45,6 +45,7 @@ def fit_maps(
         If no gait of the maps has a steady state.
     """
     base = (*base_coordinates(dataset.robot), *_effects_seen(dataset.robot, report))
+    # rows are independent runs: none stands for several
     found = fit(Maps(dataset, model, base), base, report=report, correlated=1.0)
     before, after = math.sqrt(found.start_misfit_ratio), math.sqrt(found.misfit_ratio)
     result = calibration(dataset.robot, found, before, after)
@@ -231,6 +232,7 @@ def _sd_with_tracks(
         for k, row in enumerate(rows)
     ]  # fmt: skip
     experiment = Experiment(Model(dataset.robot, model), trials, dataset.marker_sd_m)
+    # information adds up: that of some gaits, times all over some
     total = sum_eliminated(experiment.normal_equations(point, base)) * (len(dataset.maps) / len(rows))
     covariance = solve(total, range(len(base)), *priors(base, point)).covariance
     size = {

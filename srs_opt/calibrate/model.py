@@ -101,6 +101,7 @@ class Model:
     def __init__(self, robot: Robot, model: str | None = None, *, generic: bool = False) -> None:
         self.robot, self.name, self.generic = robot, model or robot.own_model, generic
         if self.name == "compliant":
+            # raises where the robot has no stiffness
             Structure.of(robot, self.name)
         self._bends = self.name == "compliant" and robot.has_stiffness
         rigid, links = "complex" if self.name == "compliant" else self.name, robot.links
@@ -132,6 +133,7 @@ class Model:
         for form, entry in own:
             self.own |= form.values(entry)
         starts = {c.name: c.start for f in self.forms for c in f.coordinates}
+        # without pressure and frequency, which come with the trial
         self._names = (*self.full.parameter_names[: -len(_CONDITIONS) + 1], *starts)
         self._column = {name: k for k, name in enumerate(self._names)}
         defaults = {**dict.fromkeys(self._names, 0.0), **starts, **self.own}
@@ -150,6 +152,7 @@ class Model:
         both = {**self.own, **values}
         present = {name.split(".")[0] for name, v in both.items() if "." in name and v != 0}
         present = (present | {c.effect for c in coordinates}) & self._levels[2]
+        # the smallest group that holds them all: fewer operations per step
         level = next(k for k, effects in enumerate(self._levels) if present <= effects)
         structure = (self.soft if self.is_soft(values) else self.rigid)[level]
         return structure, self._kept[structure]
@@ -171,6 +174,7 @@ class Model:
     def pack(self, values: Values, conditions: Conditions) -> Packed:
         """Return the numbers for the equations at `values`."""
         self._set(self._packing, values, conditions)
+        # copies: the next call writes into the same buffers
         return Packed(*(result.reshape(-1).copy() for result in self._packing.results))
 
     def seeds(self, values: Values, conditions: Conditions, coordinates: Sequence[Coordinate]) -> Packed:

@@ -70,6 +70,7 @@ class NormalEquations:
         return self._known[inflation]
 
     def _eliminate(self, inflation: float, held: np.ndarray | None, damping: float) -> Eliminated:
+        # dtype: an empty list would become an index of floats
         index = np.array(self.scattered, dtype=int)
         precision = self.scatter_sd**-2.0
         whole = self.raw / inflation

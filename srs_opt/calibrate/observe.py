@@ -186,6 +186,7 @@ def _at_once(
     by = model.seeds(values, conditions_of(trial), coordinates)
     seeds = by.p[kept]
     softening = np.array([model.softens(c, values) for c in coordinates])
+    # what acts on camera or clock alone needs no integration
     moving = np.flatnonzero(np.any(seeds != 0, axis=0) & ~softening)
     jac_pose = by_pose.reshape(frames, 3, seen).transpose(0, 2, 1)
     jac_shape = by_shape.reshape(frames, -1, seen).transpose(0, 2, 1)

@@ -71,6 +71,7 @@ def outlying_trials(
             max(g.misfit / max(g.count, 1) - 1 for g in others),
             OUTLYING_TRIAL.notable_misfit / OUTLYING_TRIAL.apart_ratio,
         )
+        # with its own best scatter: a friction of its own is no contradiction
         normal = experiment.normal_equations(
             own_scatter(experiment, without, [worst]), _own(without), [worst]
         )[worst.name]

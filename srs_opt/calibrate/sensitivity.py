@@ -63,6 +63,7 @@ def variation(
     courses = []
     for off, seed, turn in zip(step, seeds.T, (initial_pose(structure, p, heading_rad)[1] @ seeds).T):
         x = start.copy()
+        # the tail stays at the origin, so that lengths and masses move the centre of mass at the start
         x[POSE] += off * turn
         courses.append(course(x, p + off * seed))
     # another structure integrates the actuators otherwise: what it makes of the nodes' motion comes first

@@ -74,6 +74,7 @@ def smooth_part(
     plain = tried[0.0, 0.0]
     drift, systematic = min(tried, key=lambda key: sum(tried[key]))
     misfit, _ = tried[drift, systematic]
+    # the misfit of noise alone has mean count and variance 2 count
     explained = misfit < count + SMOOTH_ERRORS.most_left_sd * math.sqrt(2 * count)
     if not explained or sum(plain) - sum(tried[drift, systematic]) < SMOOTH_ERRORS.detected_deviance:
         return noise

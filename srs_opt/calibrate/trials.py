@@ -204,6 +204,7 @@ class Trials:
         def later(shift_s: float) -> Trial:
             return replace(trial, time_s=trial.time_s + shift_s)
 
+        # beyond half a cycle it would be another cycle; never before the valves' start
         most = min(0.5 * trial.period_s, float(trial.time_s[0]))
         found, free = align(track, lambda shift: seen_of(later(shift), nodes, values).points, most)
         raw = seen_of(later(found.later_s), nodes, values, coordinates)
@@ -254,7 +255,9 @@ class Trials:
         names = tuple(c.name for c in request.coordinates)
         wide, here = extra is not None, self._place(name, request)
         kept = self._jacobian[name].get(wide)
+        # derivatives of this very place are not stale
         served = kept is not None and kept.place != here and _serve(kept, request, wide)
+        # what was taken here already, whatever it was asked together with
         known = {k: v for s in self._jacobian[name].values() if s.place == here for k, v in _columns(s)}
         if served:
             assert kept is not None

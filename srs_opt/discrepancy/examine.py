@@ -96,6 +96,7 @@ def examined(
     score, covariance = project(total, range(lin.fitted), range(lin.fitted, columns), precision, offset)
     covariance = with_shared(covariance, np.append(np.zeros(size - lin.fitted), shared_sd))
     further = [[lin.column(c.name) - lin.fitted for c in k.sizes] for k in candidates]
+    # effects that are fitted already have no further column
     tested = [g for g in further if min(g) >= 0]
     start = size - lin.fitted
     families = [[start + k for k in g.columns] for g in groups] + tested

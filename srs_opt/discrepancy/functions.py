@@ -152,6 +152,7 @@ def _patterns(
     def pattern(direction: np.ndarray, weight: np.ndarray) -> np.ndarray:
         return np.asarray((direction * weight[None, :, None]).reshape(len(heading), -1))
 
+    # nearly orthogonal over the markers, so that parts of the motion do not imitate each other
     legendre = [np.polynomial.Legendre.basis(k)(place) for k in range(5)]
     known = {
         "motion along": [pattern(along, legendre[0])],

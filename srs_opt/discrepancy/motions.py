@@ -70,6 +70,7 @@ def _advance(trial: Trial, track: np.ndarray) -> tuple[float, float] | None:
         return None
     places = track[:, 0::2] + 1j * track[:, 1::2]
     now, then = places[:-cycle], places[cycle:]
+    # only markers seen at both instants, or the mean would jump with them
     both = np.isfinite(now) & np.isfinite(then)
     seen = both.sum(axis=1)
     now, then = (np.where(both, z, 0.0) for z in (now, then))

@@ -206,6 +206,7 @@ def _examine(
     if first is None:
         why = "the robot as documented cannot be simulated under these trials' conditions"
         return _not_testable(dataset, split, experiment.sd_m, started, why)
+    # before any test: to white noise's statistics colour would look like a gap
     first = search.coloured(first)
     tell(f"screening {len(search.candidates)} candidates")
     null = search.noise_aware(search.examine(first))

@@ -210,6 +210,7 @@ def _sizes(total: np.ndarray, correlated_m: float) -> tuple[float, float, float]
 
 def _ratio(sizes: tuple[float, float, float]) -> float | None:
     before, after, floor = sizes
+    # of a gap that drowns in the noise no share can be told
     if before - floor <= SEAL.measurable_share * floor:
         return None
     return (after - floor) / (before - floor)

@@ -35,6 +35,7 @@ def record_of(run: Integrator, task: Task, found: Manoeuvre) -> dict[str, Any]:
         "end": {"x_m": x, "y_m": y, "heading_rad": heading, "speed_m_s": float(np.hypot(u, v))},
         "switches": plan.switch_records(),
         "fills": plan.fills,
+        # volume times pressure per fill, Pa from kPa
         "air_j": plan.fills * chamber_volume_m3(run.robot) * plan.pressure_kpa * 1e3,
         "space_m": 2 * disc_radius_m(points, run.robot.body_width_m / 2),
         "certificate": found.certificate.record(),

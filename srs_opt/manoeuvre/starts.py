@@ -101,6 +101,7 @@ def arrived(task: Task, shot: Shot) -> int | None:
 def lengths(task: Task, gait: Gait) -> list[ValvePlan]:
     """Return the gait played for several lengths of time, with what the task's start and end ask for."""
     longest = task.longest_s or _likely_s(task)
+    # in equal ratios: a tenth of a second matters for a short time only
     times = np.geomspace(max(longest / 6, WAVE_START.least_s), longest, WAVE_START.lengths)
     return [with_end(task, ValvePlan.of_gaits((gait,), float(played))) for played in times]
 

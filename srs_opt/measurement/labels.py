@@ -85,6 +85,7 @@ def _stretch(chain: Chain, frame: Array) -> tuple[np.ndarray, Array]:
 def take(cloud: Array, owners: np.ndarray) -> Array:
     """Return the links' positions, shape (T, M, 2), given which position each link owns (-1: none)."""
     frames = np.arange(len(cloud))[:, None]
+    # position 0 stands in where there is none, and is masked next
     positions = cloud[frames, np.maximum(owners, 0)]
     return np.where((owners >= 0)[..., None], positions, np.nan)
 

@@ -225,6 +225,7 @@ def motion_map(dataset: DataSet, motions: tuple[Motion, ...] | None = None) -> t
     groups: dict[tuple[float, float, float, float], list[Motion]] = {}
     for trial in dataset.trials:
         if trial.name in found and trial.schedule is None and trial.applied is None:
+            # settings that were typed in twice are equal but for rounding
             key = (trial.frequency_hz, trial.pressure_kpa, trial.offset, trial.phase_lag_rad)
             groups.setdefault(tuple(round(v, 6) for v in key), []).append(found[trial.name])  # type: ignore[arg-type]
     return tuple(_map_row(key, group) for key, group in sorted(groups.items()))

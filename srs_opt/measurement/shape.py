@@ -110,6 +110,8 @@ def shape_from_markers(
     q, cost = _levenberg_marquardt(chain, points, marker_sd_m, prior, start)
     information, _ = _normal_equations(chain, points, marker_sd_m, q)
     covariance: Array = np.linalg.inv(information + np.diag(prior)).astype(float)
+    # posterior over prior variance in the direction that is known least: near 1 the markers tell nothing of
+    # it
     spread = np.linalg.eigvalsh(covariance[:, 3:, 3:])[:, -1] / prior_sd_1_m**2
     # the markers' part of the cost alone
     misfit = cost - (q**2 * prior).sum(axis=1)

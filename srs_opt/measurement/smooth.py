@@ -267,6 +267,7 @@ def _linearise(
 def _banded(diagonal: Array, coupling: Array) -> Array:
     """Return the block-tridiagonal matrix in LAPACK's lower banded form."""
     frames, size = diagonal.shape[:2]
+    # a[i, j] stands at band[i - j, j]; below the diagonal blocks stands the coupling's transpose
     band = np.zeros((2 * size, frames, size))
     for row in range(size):
         for column in range(row + 1):

@@ -178,6 +178,7 @@ def turn_rate_guess(time_s: Array, tracks: Complex, period_s: float) -> float:
     """
     now, later = _at(time_s, tracks, 0.0), _at(time_s, tracks, period_s)
     if tracks.shape[1] > 1:
+        # a marker that is lost at one end would shift the means against each other
         both = np.where(np.isfinite(now) & np.isfinite(later), 1.0, np.nan)
         a = now * both - np.nanmean(_safe(now * both), axis=1, keepdims=True)
         b = later * both - np.nanmean(_safe(later * both), axis=1, keepdims=True)

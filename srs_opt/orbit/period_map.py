@@ -89,6 +89,7 @@ def _varied(
         states, errors = kernel.run(courses)
         ends.append(states[-1].T)
         if k == 0:
+            # the first course is the unperturbed one
             path, error = states[:, :, 0].T, errors[:, 0]
     last = np.concatenate(ends)[:, dynamic]
     return PeriodMap(path, error, last[0], ((last[1:] - last[0]) / steps[:, None]).T)

@@ -116,6 +116,7 @@ def sensitivity(robot: Robot, orbit: Orbit, model: str | None = None) -> Sensiti
 
 def _moved_switch(run: Integrator, orbit: Orbit, p: np.ndarray, segment: int, at_s: float) -> _Direction:
     """Return the tangent of moving to later the switch of one segment's valve at `at_s`."""
+    # steps end at switches, so that one stands on a node but for rounding
     node = int(np.argmin(abs(orbit.time_s - at_s)))
     if node == orbit.time_s.size - 1:  # the end of the period is its start
         node = 0
@@ -123,6 +124,7 @@ def _moved_switch(run: Integrator, orbit: Orbit, p: np.ndarray, segment: int, at
     state = solution.start if node == 0 else solution.states[:, node - 1]
     after = solution.valve[:, solution.mesh.phase[node]].copy()
     before = after.copy()
+    # a gait's valves stand left or right, nothing else
     before[segment] = -after[segment]
     rates = actuator_rates(run.structure)
     jump = [np.asarray(rates(state[run.layout.actuator], v, p)).ravel() for v in (before, after)]

@@ -290,6 +290,7 @@ def _newton_direction(m: np.ndarray, residual: np.ndarray) -> np.ndarray:
 
 def _settled(cycle: Cycle, mesh: Mesh, tolerance: float) -> Search[tuple[np.ndarray, Mesh]]:
     """Return the dynamic states after some periods from rest and a mesh on which that motion is accurate."""
+    # the even steps may have been too long for this motion
     dynamic, mesh = np.zeros(len(cycle.run.layout.dynamic)), mesh.halved().halved()
     for _ in range(ORBIT.settling_periods):
         end, mesh = yield from _accurate_period_map(cycle, cycle.start(dynamic), mesh, tolerance)

@@ -69,6 +69,7 @@ def run_batched(searches: Sequence[Search[T]]) -> list[T | NoAnswerError]:
             advance(fresh.popleft(), None)
         if not waiting:
             break
+        # the kernel that most wait for: its lanes are full
         kernel = max(waiting, key=lambda k: len(waiting[k]))
         # alike lengths share a call: the short rest while the long go on
         queue = sorted(waiting.pop(kernel), key=lambda entry: entry[1].mesh.h_s.size)

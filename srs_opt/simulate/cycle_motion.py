@@ -111,6 +111,7 @@ def _forward(
     """Return +1 if the mean motion runs along the mean heading, -1 if against it."""
     middle = weights @ pose[:, :2]
     arm = middle - centre
+    # the velocity of a rotation, e_z x arm times its sense
     travel = np.sign(displacement[2]) * np.array([-arm[1], arm[0]])
     return 1.0 if travel @ np.array([np.cos(heading), np.sin(heading)]) >= 0 else -1.0
 

@@ -179,6 +179,7 @@ class Integrator:
         first, last = np.searchsorted(like.time_s, [begin_s + 1e-9, begin_s + durations.sum() - 1e-9])
         window = slice(max(int(first) - 1, 0), int(last))
         nodes = like.time_s[window.start : window.stop + 1].copy()
+        # the piece's own ends, where the other motion need not have a node
         nodes[0], nodes[-1] = begin_s, begin_s + durations.sum()
         return Mesh.graded(durations, np.diff(nodes), like.error_m_s[window], tolerance)
 

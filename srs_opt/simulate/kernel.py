@@ -66,6 +66,7 @@ class Kernel:
             return _interpreted(self._slow, self._nx, courses, keep)
         n, lanes = max(c.h_s.size for c in courses), len(courses)
         x0, p = np.empty((self._nx, LANES)), np.empty((self._np, LANES))
+        # steps of length zero do nothing: a course that has ended rests
         h, valve = np.zeros((n, LANES)), np.zeros((n, self._segments, LANES))
         for k in range(LANES):  # spare lanes repeat the first course
             c = courses[k if k < lanes else 0]

@@ -97,6 +97,7 @@ def goal_rows(layout: Layout, kind: GoalKind, times: Times | None = None) -> Goa
             # speed = turn rate x radius, regular where the turn rate passes zero
             arc = number["radius_m"] * turn_rate
             if r == 0:
+                # the nominal robot keeps it exactly
                 found.append(("radius", speed - arc, 0.0, 0.0))
             else:  # one gait cannot give every robot the very same radius
                 not_negative("radius", speed - (1 - COLLOCATION.other_robots_share * GOAL.turn_error) * arc)

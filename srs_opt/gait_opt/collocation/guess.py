@@ -83,6 +83,7 @@ def states_over_cycle(
         ahead, aside = x - cx, y - cy
     # the program's frame is the one with zero means
     ahead, aside = ahead - ahead[:-1].mean(), aside - aside[:-1].mean()
+    # the program's time 0 is the first switch of the first segment
     places = (at * period + first_s) % period
     columns = [np.interp(places, time_s, states[VELOCITY][i]) for i in range(3)]
     columns += [np.interp(places, spread, v) for v in (heading + tilt, ahead, aside)]

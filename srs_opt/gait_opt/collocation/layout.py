@@ -135,6 +135,7 @@ def local_inputs(layout: Layout, robot: int, times: sparse.csr_matrix | None = N
     if times is not None:
         t = sparse.coo_matrix(times)
         point, which = t.row // 2, t.row % 2
+        # place and width are the last two of a point's local unknowns
         extra = sparse.coo_matrix((t.data, (point * width + width - 2 + which, 2 + t.col)), matrix.shape)
         matrix = matrix + extra
     return sparse.csr_matrix(matrix)
@@ -166,6 +167,7 @@ def row_outputs(layout: Layout, robot: int) -> tuple[sparse.csr_matrix, sparse.c
         point = np.arange(layout.points)
         out_rows.append(np.full(point.size, rows + q))
         out_columns.append(point * o + s + q)
+        # Radau quadrature; the element's width is in the point's outputs already
         out_data.append(np.tile(WEIGHTS, n))
     # the third quadrature is the friction work itself, the first two means that vanish
     fix_rows.append(np.array([rows + 2]))

@@ -308,6 +308,7 @@ def point_functions(kind: PointKind) -> PointFunctions:
         inputs = [y, s.scale, p, s.half_width, s.turns]
 
         def function(expression: ca.SX, *more: ca.SX) -> ca.Function:
+            # differentiated by the curvature as a symbol, filled in last
             known = ca.substitute(expression, closed, curvature)
             return ca.Function(what, [*inputs, *more], [known], {"cse": True})
 

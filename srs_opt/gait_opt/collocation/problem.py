@@ -101,6 +101,7 @@ class CycleProblem:
         limits, goal = self.limits.for_robot(self.robots[0]), self.goal
         numbers = [
             limits.min_dwell_s,
+            # 1: a number where no row asks for one
             goal.radius_m or 1.0,
             goal.envelope_m or 1.0,
             limits.chamber_volume_m3 or 0.0,

@@ -170,6 +170,7 @@ class Program:
         return g, jac, second(head, numbers, robots, lam)
 
     def _solver(self, solver: Solver, stage: Mapping[str, Any]) -> ca.Function:
+        # made once per set of options: making a solver is work that a solve need not repeat
         key = (solver, tuple(sorted(stage.items())))
         if key not in self._solvers:
             self._solvers[key] = nlp_solver(solver, stage, self._nlp, self._options)

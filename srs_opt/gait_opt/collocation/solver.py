@@ -16,6 +16,7 @@ _MINIMUM_DEGREE = 0  # MUMPS's ordering: quicker here than its own choice; METIS
 _COMMON: dict[str, Any] = {
     "print_time": False, "calc_lam_p": False, "error_on_fail": False, "show_eval_warnings": False,
 }  # fmt: skip
+# no scaling of IPOPT's own: unknowns and rows are of order one by `guess.state_scales`
 _IPOPT = {
     "print_level": 0, "sb": "yes", "mu_strategy": "adaptive", "max_iter": 300, "tol": 1e-6,
     "linear_solver": "mumps", "mumps_pivot_order": _MINIMUM_DEGREE,

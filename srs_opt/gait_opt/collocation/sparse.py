@@ -71,6 +71,7 @@ def _gather(
 ) -> Gather:
     # column by column, the order of CasADi's nonzeros
     keys = np.concatenate([c * shape[0] + r, fixed.col * shape[0] + fixed.row]).astype(np.int64)
+    # contributions that meet in one entry add up in the matrix below
     unique, place = np.unique(keys, return_inverse=True)
     column, row = np.divmod(unique, shape[0])
     indptr = np.concatenate([[0], np.cumsum(np.bincount(column, minlength=shape[1]))])
