@@ -21,8 +21,7 @@ from virtual_lab.trials import small_design
 FINE = 1e-8
 
 
-@pytest.mark.parametrize("offset", [0.0, -0.4])
-@pytest.mark.parametrize("model", ["complex", "simplified"])
+@pytest.mark.parametrize(("offset", "model"), [(0.0, "complex"), (-0.4, "complex"), (-0.4, "simplified")])
 def test_derivatives_are_those_of_whole_solutions(offset, model):
     robot = wpi_srs()
     base = base_coordinates(robot)

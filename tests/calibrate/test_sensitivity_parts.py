@@ -20,6 +20,7 @@ from srs_opt.calibrate.trial_simulation import (
 from srs_opt.measurement.records import Trial
 from srs_opt.orbit.sensitivity import tangent_kernel
 from srs_opt.robot import wpi_srs
+from srs_opt.simulate import compiled
 from srs_opt.simulate.kernel import Course
 from srs_opt.simulate.mesh import Mesh
 from srs_opt.simulate.rosenbrock import BODY_STATES
@@ -55,7 +56,7 @@ def test_the_small_structure_gives_the_derivatives_of_the_full_one(setting):
 @pytest.mark.parametrize(
     "effects", [(), ("tether_drag.force_n",), ("hysteresis.ratio", "segment_bias.bias[2]")]
 )
-def test_differences_are_the_tangents_of_the_integration(setting, effects):
+def test_differences_are_the_tangents_of_the_integration(setting, effects, monkeypatch):
     experiment, trial, base, start = setting
     model = experiment.model
     sizes = {"tether_drag.force_n": 0.02, "hysteresis.ratio": 0.1, "segment_bias.bias[2]": 0.4}
@@ -67,7 +68,10 @@ def test_differences_are_the_tangents_of_the_integration(setting, effects):
     seeds = model.seeds(values, conditions_of(trial), coordinates).p[kept]
     typical = np.array([c.typical for c in coordinates])
     found = variation(structure, nodes, nodes.p[kept], seeds, typical, trial.heading_rad)
+    tangent_kernel.cache_clear()
+    monkeypatch.setattr(compiled, "compiler", lambda: None)  # would take longer than these few steps
     kernel, n = tangent_kernel(structure), structure.segments
+    tangent_kernel.cache_clear()
     state = nodes.start
     h = np.diff(nodes.time_s)
     inputs = np.column_stack([nodes.valve, np.zeros(h.size)])

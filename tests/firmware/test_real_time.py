@@ -56,7 +56,9 @@ def _snake(header, tmp_path):
 
 def command(snake, out):
     link, poses = snake
-    words = ["planners.pilot", "mazes/first.yaml", "--valves", str(link), "--pose", poses, "--out", str(out)]
+    # a goal after the first of two U-turns: a drive lasts as long as the motion
+    words = ["planners.pilot", "mazes/first.yaml", "--goal", "0.8,0.612"]
+    words += ["--valves", str(link), "--pose", poses, "--out", str(out)]
     return [sys.executable, "-m", *words, "--json", *SLOW]
 
 

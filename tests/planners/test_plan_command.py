@@ -147,7 +147,7 @@ def test_animation(capsys, tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("planner", ["rrt", "kpiece", "dubins-rrtconnect"])
 def test_ompl_planners_find_certified_plans(capsys, tmp_path, planner):
-    half = ("--goal", "0.8,0.612")  # after the first of two U-turns: random searches take far less time
+    half = ("--goal", "1.4,0.612")  # out of the first of two U-turns: random searches take far less time
     status, answer, _ = run(
         capsys, tmp_path, MAZES / "first.yaml", *half, "--planner", planner, "--time-limit", "300"
     )
