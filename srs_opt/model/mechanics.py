@@ -214,6 +214,7 @@ class Mechanics(ABC):
             if effect.wheel_factors:
                 on_rolling, on_skidding = effect.wheel_factors(e, state)
                 f_t, f_n = f_t * on_rolling, f_n * on_skidding
+        for effect, e in p.effects:
             f_t = f_t + effect.rolling_force(e, v_t) if effect.rolling_force else f_t
         # taken before other forces are added: what a tether or a slope does is no friction
         friction_power = -(ca.dot(f_t, v_t) + ca.dot(f_n, v_n))

@@ -109,6 +109,14 @@ def test_a_wheel_that_rolls_hard_is_as_good_as_a_coefficient_of_its_own():
     assert rate_of(robot_with(*entries)) == pytest.approx(rate_of(twice), rel=1e-12)
 
 
+def test_a_factor_on_friction_leaves_viscous_forces_alone_whichever_effect_comes_first():
+    factor = {"name": "generic_along_body", "gradient": 0.8}
+    for viscous in (entry_of("viscous_rolling"), entry_of("generic_along_speed_link")):
+        added = rate_of(robot_with(factor, viscous)) - rate_of(robot_with(factor))
+        alone = rate_of(robot_with(viscous)) - rate_of(wpi_srs())
+        assert added == pytest.approx(alone, rel=1e-9, abs=1e-12)
+
+
 def test_friction_that_grows_with_time_is_a_coefficient_that_does():
     for name, own in (("along", "friction_tangential"), ("across", "friction_normal")):
         late = robot_with({"name": f"generic_{name}_time", "per_s": 0.3})  # one second after the start
