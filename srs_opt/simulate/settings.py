@@ -55,8 +55,8 @@ class MeshSettings:
     ----------
     accepted : float
         A mesh serves while no step errs by more than this many tolerances: friction forgets an error of speed
-        within milliseconds, so that single steps may be worse. Half: twice the attempts where friction
-        switches; double: errors of the track double with it.
+        within milliseconds, so that single steps may be worse. Half: the error of the track as it is;
+        double: a fifth more. The tolerance is what changes it.
     free_attempts : int
         Attempts in which the new mesh may be coarser in places. A stretch at rest looks easy until its steps
         are longer than what happens at its end; after these attempts a mesh only gets finer.
