@@ -74,7 +74,7 @@ class Certificate:
     lines : array (n, points, 2)
         Centre line of the body in the room.
     room_m : array (n,)
-        Clearance at those instants (a lower bound where it is above EXACT_BELOW), the error taken off.
+        Clearance at those instants, the error taken off (see `clearances`: large ones are lower bounds).
     cycle : int array (n,)
         Index of the cycle that each instant belongs to.
     states : tuple of arrays
@@ -182,22 +182,26 @@ class Certifier:
         time, pose, lines, kappa, cycle = time[:last], pose[:last], lines[:last], kappa[:last], cycle[:last]
         until_s, error_m = bound
         error = error_m[np.searchsorted(until_s, time).clip(max=until_s.size - 1)]
-        seen = clearances(problem, lines)
+        # the start may be as near as it likes: nothing can be asked of it that integration could lose
+        tube = np.concatenate([problem.tube_m(pose[cycle == k], gaits[k]) for k in np.unique(cycle)])
+        wanted = problem.margin_m + np.where(cycle == 0, root.slack_m - error, tube - ROUNDING_M)
+        seen = clearances(problem, lines, wanted + error)
         room = seen - error
         unseen = np.zeros(last)
         moved = np.hypot(*(lines[1:] - lines[:-1]).transpose(2, 0, 1)).max(axis=1, initial=0.0)
         unseen[1:] = moved / 2
         unseen += _sagitta(problem, kappa)
         between = float((room - unseen).min())
-        # the start may be as near as it likes: nothing can be asked of it that integration could lose
-        tube = np.concatenate([problem.tube_m(pose[cycle == k], gaits[k]) for k in np.unique(cycle)])
-        wanted = problem.margin_m + np.where(cycle == 0, root.slack_m - error, tube - ROUNDING_M)
         close = room < wanted
         failed = int(cycle[close.argmax()]) if close.any() else None
         reason = ""
         if failed is not None:
-            at_most = 1e3 * float(seen.min())
-            reason = f"the body comes within {at_most:.2f} mm of a wall in cycle {failed + 1}"
+            here = close & (cycle == failed)
+            least_mm, wanted_mm = 1e3 * room[here].min(), 1e3 * wanted[here].max()
+            reason = (
+                f"the body keeps {least_mm:.2f} mm from walls in cycle {failed + 1}, "
+                f"where {wanted_mm:.2f} mm are wanted"
+            )
         elif between < 0:
             failed = int(cycle[int((room - unseen).argmin())])
             reason = f"contact between two instants of cycle {failed + 1} cannot be ruled out"
@@ -262,11 +266,14 @@ def _joined(played: Sequence[Trajectory]) -> tuple[Array, Array, Array, NDArray[
     return np.concatenate(time), np.concatenate(pose), np.concatenate(kappa), cycle
 
 
-def clearances(problem: Problem, lines: Array, limit_m: float | None = None) -> Array:
-    """Return the clearance of bodies (n, points, 2): exact below `limit_m`, a lower bound above."""
-    limit_m = EXACT_BELOW * problem.robot.length_m if limit_m is None else limit_m
+def clearances(problem: Problem, lines: Array, wanted_m: Array | float = 0.0) -> Array:
+    """Return the clearance of bodies (n, points, 2).
+
+    It is exact below EXACT_BELOW, and below what is `wanted_m` of each; above, a lower bound.
+    """
+    exact_below_m = np.maximum(EXACT_BELOW * problem.robot.length_m, wanted_m)
     room = problem.body.estimate(lines) - problem.field.error_m
-    close = room < limit_m
+    close = room < exact_below_m
     if close.any():
         room[close] = problem.body.exact(lines[close], room[close] + problem.field.error_m)
     return room

@@ -4,10 +4,12 @@ import dataclasses
 
 import numpy as np
 import pytest
+import shapely
 from planner_rooms import maze_of
 
 from benchmarks.planner_drive import measured, rows
 from planners.motion.bending import Bending
+from planners.plan.certify import clearances
 from planners.plan.solve import solve_with_lattice
 from planners.search.problem import Problem
 from planners.search.tree import at_rest
@@ -94,3 +96,14 @@ def test_plans_with_the_drive_arrive_nearer_on_a_robot_with_wider_turns():
     replans = np.array([row[2] for row in study])
     assert replans[:, 1].sum() <= replans[:, 0].sum()
     assert all(arrived[1] for *_, arrived in study)
+
+
+def test_room_that_an_uncertain_drive_keeps_is_measured_exactly(bend_problem):
+    """Far from walls a certificate takes the distance table's lower bound, but not where more is wanted."""
+    problem = bend_problem()
+    lines = solve_with_lattice(problem).plan.certificate.lines[::20]
+    exact = np.array([problem.maze.clearance(shapely.LineString(line)) for line in lines])
+    exact -= problem.robot.body_width_m / 2
+    np.testing.assert_allclose(clearances(problem, lines, 1.0), exact, atol=1e-9)
+    bound = clearances(problem, lines)
+    assert (bound <= exact + 1e-9).all() and (bound < exact - 1e-3).any()
