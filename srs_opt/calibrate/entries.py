@@ -32,7 +32,7 @@ def contradicted(trial: Trial) -> str:
         and own < ENTRY.least_power_share * power.max()
     ):
         return f"the body swings at {best:.2g} Hz, not at the {entered:.3g} Hz that are entered"
-    # joint i + 1 less joint i, the beta_i of (13)
+    # joint i + 1 less joint i: beta_{i+1} - beta_i of (13)
     lags = np.angle(waves[1:] * np.conj(waves[:-1]))
     mean = np.angle(np.exp(1j * lags).sum())
     even = np.abs(np.angle(np.exp(1j * (lags - mean)))).max() < ENTRY.even_rad
