@@ -214,7 +214,7 @@ def _drifts(flat: Array, sd: float) -> bool:
         return False
     steps = np.arange(len(flat)) - (len(flat) - 1) / 2
     trend = steps @ flat / (steps @ steps)
-    # of noise alone: slopes over their deviations, squared, one per coordinate
+    # of noise alone: trends over their deviations, squared, one per coordinate
     chi2 = float((trend**2).sum() * (steps @ steps)) / max(sd, 1e-9) ** 2
     drifts: bool = chi2 > flat.shape[1] + ONSET.drift_sd * np.sqrt(2 * flat.shape[1])
     return drifts
