@@ -162,13 +162,13 @@ def _continued(problem: CycleProblem, start: Gait, spec: TableSpec) -> Continuat
     own = problem.robots[0].friction_speed_m_s
     if spec.after is None:
         return run_stages(problem, start, continuation_stages(own))
-    last = Stage(own, 70, 0.03, 2)
-    found = run_stages(problem, start, (Stage(max(own, 0.004), 60, 0.06, 3), last))
+    stages = tuple(Stage(max(own, v), n, reach, most) for v, n, reach, most in TABLE.stages)
+    found = run_stages(problem, start, stages)
     band = spec.band_m
     if band is not None and (excess := sum(found.orbits[0].envelope_m) - band) > TABLE.band_excess * band:
         # the mesh sees the body's reach at some instants only: ask for less by as much as it missed
         less = replace(problem, goal=replace(problem.goal, envelope_m=band - excess))
-        again = run_stages(less, found.gait, (last,))
+        again = run_stages(less, found.gait, stages[-1:])
         found = replace(again, score=score(problem, again.gait, again.orbits))
     return found
 

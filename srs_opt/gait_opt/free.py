@@ -174,14 +174,10 @@ def _total(problem: CycleProblem, found: Found) -> float:
 def _refined(problem: CycleProblem, gait: Gait, wave: Found, say: Callable[[str], None]) -> Found | None:
     """Take one on/off gait up the last stages and optimize its switch times exactly."""
     own = max(r.friction_speed_m_s for r in problem.robots)
-    stages = (
-        Stage(FREE_VALVES.friction_speed_m_s, 60, 0.05, 6),
-        Stage(max(own, 0.004), 70, 0.03, 3),
-        Stage(own, 80, 0.02, 2),
-    )
+    stages = tuple(Stage(max(own, v), n, reach, most) for v, n, reach, most in FREE_VALVES.stages)
     try:
         top = run_stages(problem, gait, stages)
-        exact, certificate, orbits = finished(problem, top.gait, 0.01)
+        exact, certificate, orbits = finished(problem, top.gait, FREE_VALVES.reach)
     except NoAnswerError as error:
         say(f"a rounded gait was dropped: {error}")
         return None
@@ -203,7 +199,7 @@ def _refined(problem: CycleProblem, gait: Gait, wave: Found, say: Callable[[str]
 
 def _wave_with_notches(problem: CycleProblem, gait: Gait) -> Gait:
     period = gait.period_s
-    width = 1.5 * max(problem.limits.min_dwell_s, 2 * problem.limits.tick_s) / period
+    width = FREE_VALVES.notch_dwells * max(problem.limits.min_dwell_s, 2 * problem.limits.tick_s) / period
     rows = []
     for ((on, off),) in gait.intervals:
         pulse = (on / period, (on + (off - on) % period) / period)
@@ -252,9 +248,9 @@ def rounded(relaxation: Relaxation, problem: CycleProblem) -> tuple[Gait, tuple[
     rows, counts = [], []
     for levels in relaxation.levels.T:
         on = sum_up(np.repeat(levels, FREE_VALVES.places))
-        pulses = merged(intervals_of(on), 1.05 * dwell, problem.intervals)
+        pulses = merged(intervals_of(on), FREE_VALVES.least_dwells * dwell, problem.intervals)
         counts.append(len(pulses))
-        pulses = notched(pulses, 1.5 * dwell, problem.intervals)
+        pulses = notched(pulses, FREE_VALVES.notch_dwells * dwell, problem.intervals)
         rows.append(tuple((a % 1.0 * period, b % 1.0 * period) for a, b in pulses))
     return Gait(period, relaxation.pressure_kpa, tuple(rows)), tuple(counts)
 

@@ -40,7 +40,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Say = Callable[[str], None]
-_MOVED = Stage(0.01, 36, 0.1, 2, quick=True)  # friction that forgives, for results that had to move
 
 
 @dataclass(frozen=True)
@@ -161,7 +160,7 @@ def search(
     else:
         start, near = _warmed(problem, warm, say)
         candidates, lower = [start], ()
-        upper = () if near else (replace(_MOVED, friction_speed_m_s=max(own, _MOVED.friction_speed_m_s)),)
+        upper = () if near else (_moved_stage(own),)
         reach = GAIT_SEARCH.near_reach if near else GAIT_SEARCH.moved_reach
     continuing = _Continuing(problem, len(candidates), say)
     continued, interrupted = _all(continuing, list(enumerate(candidates)), lower, where)
@@ -207,6 +206,13 @@ def search(
         exact.prices,
         settled,
     )
+
+
+def _moved_stage(own_m_s: float) -> Stage:
+    """Return the stage for an earlier result that had to move."""
+    s = GAIT_SEARCH
+    friction_m_s = max(own_m_s, s.moved_friction_m_s)
+    return Stage(friction_m_s, s.moved_elements, s.moved_stage_reach, s.moved_repeats, quick=True)
 
 
 def _rugged(problem: CycleProblem) -> bool:

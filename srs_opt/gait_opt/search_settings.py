@@ -81,6 +81,8 @@ class GaitSearchSettings:
         Cycles that the switches may move in the last stage.
     near_reach, moved_reach : float
         The same for earlier results that keep the new limits, and for those that had to move.
+    moved_friction_m_s, moved_elements, moved_stage_reach, moved_repeats
+        Of the stage that those that had to move go through first: friction that forgives, on a coarse mesh.
     beyond_fastest : float
         Share by which a wanted speed may exceed the fastest gait's before it is refused: that search's own
         error.
@@ -96,6 +98,10 @@ class GaitSearchSettings:
     exact_reach: float = 0.01
     near_reach: float = 0.05
     moved_reach: float = 0.02
+    moved_friction_m_s: float = 0.01
+    moved_elements: int = 36
+    moved_stage_reach: float = 0.1
+    moved_repeats: int = 2
     beyond_fastest: float = 0.03
     scatter: float = 0.03
     kept_miss: float = 5e-3
@@ -168,6 +174,14 @@ class FreeValveSettings:
         Smoothing of the friction in it.
     first_level : float
         Size of the first guess's valve levels: off their bounds, from which an interior point moves slowly.
+    stages : tuple of (float, int, float, int)
+        By which a rounded gait is taken to the robot's own friction: smoothing speed (m/s; the last is the
+        robot's own), elements, reach of the switches (cycles), repeats.
+    reach : float
+        Cycles that its switches may move in the last optimization.
+    least_dwells, notch_dwells : float
+        Length, in dwell times, below which a rounded pulse is dropped, and of a notch that is cut where
+        there are fewer pulses than asked for: a notch at the dwell itself could not move.
     places : int
         Instants per element at which sum-up rounding decides.
     """
@@ -175,6 +189,14 @@ class FreeValveSettings:
     elements: int = 40
     friction_speed_m_s: float = 0.01
     first_level: float = 0.8
+    stages: tuple[tuple[float, int, float, int], ...] = (
+        (0.01, 60, 0.05, 6),
+        (0.004, 70, 0.03, 3),
+        (0.0, 80, 0.02, 2),
+    )
+    reach: float = 0.01
+    least_dwells: float = 1.05
+    notch_dwells: float = 1.5
     places: int = 25
 
 

@@ -172,15 +172,27 @@ class StartSettings:
         the turn rate jumps with the bias.
     turn_tolerance_rad_s : float
         To which a start's turn rate is brought to a wanted radius.
+    smoothed_turn_rad_s, rough_turn_rad_s : float
+        The same with smoothed friction, and of searches for tight turns and pivots.
     steered_rad_s : float
-        Turn rate from which searches for tight turns and pivots start.
+        Turn rate from which those start.
+    least_waves, wave_range : float
+        Quasi-random waves: least number of waves on the body and the range of it, where one more link than
+        there are segments holds a wave: from three quarters of a wave to one and a half.
+    phase_range_rad : float
+        Of each segment's phase besides.
     pressure_shares, waves_on_body : tuple of float
         Plain waves: pressures over the largest, and waves on the body.
     """
 
     friction_speed_m_s: float = 0.1
     turn_tolerance_rad_s: float = 0.02
+    smoothed_turn_rad_s: float = 0.05
+    rough_turn_rad_s: float = 0.1
     steered_rad_s: float = 0.5
+    least_waves: float = 0.7
+    wave_range: float = 0.9
+    phase_range_rad: float = 0.4
     pressure_shares: tuple[float, ...] = (0.45, 0.55, 0.7, 0.85, 1.0)
     waves_on_body: tuple[float, ...] = (0.7, 0.85)
 
@@ -249,8 +261,8 @@ class CertificateSettings:
     standing_start : float
         Of the steady speed: up to which the last of `cycles` cycles from rest may differ.
     limit_excess, constraint_excess : float
-        Of a limit (band, curvature), and of an objective's own constraint: by which it may be exceeded after
-        switches are rounded to ticks, which moves them by half a tick.
+        Of a limit (band, curvature), and of an objective's own constraint: by which it may be exceeded
+        after switches are rounded to ticks, which moves them by half a tick.
     """
 
     cycles: int = 50

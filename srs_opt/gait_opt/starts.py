@@ -38,8 +38,8 @@ def starting_gaits(problem: CycleProblem, count: int, seed: int) -> list[Gait]:
         ranges = (limits.frequency_hz, limits.pressure_kpa)
         frequency, pressure = (float(a + v * (b - a)) for v, (a, b) in zip(u, ranges))
         # from three quarters of a wave on the body to one and a half
-        lag = wholeturn / (segments + 1) * (0.7 + 0.9 * u[2])
-        phases = lag * np.arange(1, segments + 1) + 0.4 * (u[3:] - 0.5)
+        lag = wholeturn / (segments + 1) * (START.least_waves + START.wave_range * u[2])
+        phases = lag * np.arange(1, segments + 1) + START.phase_range_rad * (u[3:] - 0.5)
         gaits.append(Wave(frequency, pressure, tuple(phases.tolist()), (0.0,) * segments).gait())
     return [turned(problem, g) for g in gaits]
 
@@ -52,11 +52,15 @@ def turned(problem: CycleProblem, gait: Gait) -> Gait:
         turn = goal.sense * START.steered_rad_s
         if goal.sense * steady_gait(robot, gait, problem.model).turn_rate_rad_s >= START.steered_rad_s:
             return gait
-        return steered(gait, lambda g: steady_gait(robot, g, problem.model).turn_rate_rad_s - turn, 0.1)
+        return steered(
+            gait,
+            lambda g: steady_gait(robot, g, problem.model).turn_rate_rad_s - turn,
+            START.rough_turn_rad_s,
+        )
     if goal.radius_m is None and not goal.turn_rate_rad_s:
         return gait
     try:
-        return steered(gait, turn_miss(problem, START.friction_speed_m_s), 0.05)
+        return steered(gait, turn_miss(problem, START.friction_speed_m_s), START.smoothed_turn_rad_s)
     except NoAnswerError:
         return gait
 

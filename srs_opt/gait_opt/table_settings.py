@@ -23,6 +23,9 @@ class TableSettings:
         An integer, since the firmware counts in integers.
     pressure_kpa : (float, float)
         Limits of the pressure, wider than a single gait's: slim gaits need less.
+    stages : tuple of (float, int, float, int)
+        From a neighbour's optimum: smoothing speed (m/s; the last is the robot's own), elements, reach of
+        the switches (cycles), repeats.
     band_excess : float
         Share by which a finished gait's band may exceed the wanted one.
     radius_error : float
@@ -37,6 +40,7 @@ class TableSettings:
     lever_m: float = 0.1
     steady_weight: int = 4
     pressure_kpa: tuple[float, float] = (20.0, 55.0)
+    stages: tuple[tuple[float, int, float, int], ...] = ((0.004, 60, 0.06, 3), (0.0, 70, 0.03, 2))
     band_excess: float = 0.01
     radius_error: float = 0.03
     wider_m_s_per_m: float = 2.0
