@@ -82,8 +82,8 @@ def section(rows: list[Row], when: str) -> Section:
 
 
 def run(quick: bool) -> Section:
-    """Return the stored study; one short maze if quick or where there is none."""
-    stored = None if quick else stored_rows(NAME)
+    """Return the stored study, quick or not; one short maze where there is none."""
+    stored = stored_rows(NAME)
     if stored is None:
         return section([Row(**attempt("door 72"))], "One maze only.")
     when, rows = stored

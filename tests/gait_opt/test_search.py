@@ -142,7 +142,7 @@ def test_one_gait_for_robots_with_other_friction():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("links", "seed"), [(3, 8), (4, 1), (5, 2), (6, 3), (8, 9)])
+@pytest.mark.parametrize(("links", "seed"), [(3, 8), (5, 2), (8, 9)])
 def test_random_robots_need_no_tuning(links, seed):
     """Length, friction and time constants at random: certified, and better than the published gait.
 
