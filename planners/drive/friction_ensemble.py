@@ -156,9 +156,10 @@ class FrictionEnsemble:
 
         A rigid plan's state does not know how a soft body is bent; the suspect's own last cycle does.
         """
-        if run.layout == self.problem.integrator.layout:
+        planned = self.problem.integrator
+        if (run.layout, run.structure.model) == (planned.layout, planned.structure.model):
             return state
-        begun = run.layout.adopt(state, self.problem.integrator.layout)
+        begun = run.adopt(state, planned)
         if run in self._bends and np.array_equal(state, self._now):
             begun[run.layout.kappa.start : run.layout.dkappa.stop] = self._bends[run]
         return begun

@@ -208,7 +208,7 @@ class Problem:
 
         `run` is that robot's model; by default one of the planned robot's kind.
         """
-        return self.integrator.layout.adopt(state, (run or self.integrator).layout)
+        return self.integrator.adopt(state, run or self.integrator)
 
     def bent(self, trajectory: Trajectory, before: int, gait: int) -> Trajectory:
         """Return the model's trajectory of one cycle as measured factors have it."""

@@ -231,6 +231,16 @@ class Solution:
     deviance: float
 
 
+def scaled_inverse(matrix: np.ndarray) -> np.ndarray:
+    """Return the pseudo-inverse of a Gram matrix, scaled to unit diagonal before its rank is judged.
+
+    Without the scaling the rank would depend on the coordinates' units.
+    """
+    scale = 1 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    both = scale[:, None] * scale
+    return np.asarray(np.linalg.pinv(matrix * both, rcond=OBJECTIVE.least_eigenvalue, hermitian=True) * both)
+
+
 def solve(total: np.ndarray, chosen: Sequence[int], precision: np.ndarray, offset: np.ndarray) -> Solution:
     """Minimise the deviance over the coordinates `chosen`.
 
@@ -244,10 +254,7 @@ def solve(total: np.ndarray, chosen: Sequence[int], precision: np.ndarray, offse
     index = np.asarray(chosen, dtype=int)
     a = total[np.ix_(index, index)] + np.diag(precision[index])
     g = total[index, -1] - precision[index] * offset[index]
-    # scaled to unit diagonal first: the rank would else depend on the coordinates' units
-    scale = 1 / np.sqrt(np.maximum(np.diag(a), 1e-300))
-    inverse = np.linalg.pinv(a * scale[:, None] * scale, rcond=OBJECTIVE.least_eigenvalue, hermitian=True)
-    inverse *= scale[:, None] * scale
+    inverse = scaled_inverse(a)
     step = inverse @ g
     # the quadratic at its minimum, c - g' A^-1 g
     deviance = float(total[-1, -1] + np.sum(precision * offset**2) - g @ step)

@@ -11,7 +11,7 @@ import numpy as np
 from srs_opt.calibrate.coordinates import Coordinate
 from srs_opt.calibrate.experiment import Point
 from srs_opt.calibrate.fit_settings import OBJECTIVE
-from srs_opt.calibrate.normal_equations import NormalEquations, Solution, bounded_solve
+from srs_opt.calibrate.normal_equations import NormalEquations, Solution, bounded_solve, scaled_inverse
 
 
 def priors(coordinates: Sequence[Coordinate], point: Point) -> tuple[np.ndarray, np.ndarray]:
@@ -207,9 +207,7 @@ def _solved(
     return bounded_solve(total, range(len(coordinates)), precision, offset, lower - now)
 
 
-def projected(
-    total: np.ndarray, fitted: int, precision: np.ndarray, rank: float | None = None
-) -> tuple[np.ndarray, np.ndarray]:
+def projected(total: np.ndarray, fitted: int, precision: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Project what is fitted out of what is not.
 
     Parameters
@@ -218,8 +216,6 @@ def projected(
         Normal equations, the fitted columns first.
     precision : array (fitted or more,)
         Of the priors.
-    rank : float, optional
-        Smallest eigenvalue of the fitted part, over its largest, that counts; default numpy's.
 
     Returns
     -------
@@ -228,8 +224,7 @@ def projected(
     left : array (n - fitted, n - fitted)
         Normal equations of the others after the fitted have followed them.
     """
-    inner = total[:fitted, :fitted] + np.diag(precision[:fitted])
-    inverse = np.linalg.pinv(inner, rcond=rank, hermitian=True)
+    inverse = scaled_inverse(total[:fitted, :fitted] + np.diag(precision[:fitted]))
     # Schur complement: what the others tell that the fitted cannot imitate
     cross = total[:fitted, fitted:]
     return inverse, total[fitted:, fitted:] - cross.T @ inverse @ cross

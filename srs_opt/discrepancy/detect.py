@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from srs_opt.calibrate.normal_equations import scaled_inverse
 from srs_opt.discrepancy.gap_settings import DETECTION
 
 
@@ -72,11 +73,7 @@ def project(
         Priors of the fitted coordinates.
     """
     f, e = np.asarray(fitted), np.asarray(further)
-    inner = total[np.ix_(f, f)] + np.diag(precision)
-    # scaled to unit diagonal, so that the rank does not depend on the coordinates' units
-    scale = 1 / np.sqrt(np.maximum(np.diag(inner), 1e-300))
-    inverse = np.linalg.pinv(inner * scale[:, None] * scale, rcond=1e-12, hermitian=True)
-    inverse *= scale[:, None] * scale
+    inverse = scaled_inverse(total[np.ix_(f, f)] + np.diag(precision))
     cross = total[np.ix_(e, f)]
     # s_e - C A^-1 s_f with A the fitted part, priors included: the refit is taken off both score and
     # covariance

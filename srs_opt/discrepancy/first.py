@@ -10,7 +10,6 @@ import numpy as np
 from srs_opt.calibrate.candidates import all_candidates, fitted_coordinates
 from srs_opt.calibrate.experiment import Experiment, Point
 from srs_opt.calibrate.fit import start_point
-from srs_opt.calibrate.fit_settings import OBJECTIVE
 from srs_opt.calibrate.model import Model
 from srs_opt.calibrate.noise import Noise
 from srs_opt.calibrate.objective import priors, projected, sum_eliminated
@@ -42,7 +41,7 @@ def first_experiment(dataset: DataSet, noise: Noise, model: str | None = None) -
         return None
     total, fitted = sum_eliminated(equations), len(coordinates)
     precision, _ = priors(coordinates, point)
-    _, left = projected(total, fitted, precision, OBJECTIVE.least_eigenvalue)
+    _, left = projected(total, fitted, precision)
     limit = chdtri(1, DETECTION.name_level / len(candidates))
     powers: dict[str, float] = {}
     for k, candidate in enumerate(candidates):

@@ -9,7 +9,6 @@ import numpy as np
 
 from srs_opt.calibrate.candidates import Candidate
 from srs_opt.calibrate.experiment import Experiment, Point
-from srs_opt.calibrate.fit_settings import OBJECTIVE
 from srs_opt.calibrate.noise import track_of
 from srs_opt.calibrate.objective import priors, projected, sum_eliminated
 from srs_opt.discrepancy.diagnostics import Diagnostics, needed_gain
@@ -66,7 +65,7 @@ def visible(
     lin = null.linearisation
     total = sum_eliminated(lin.telling, lin.variance_inflation)
     precision, _ = priors(lin.coordinates, lin.point)
-    inverse, left = projected(total, lin.fitted, precision, OBJECTIVE.least_eigenvalue)
+    inverse, left = projected(total, lin.fitted, precision)
     free = {c.name: k for k, c in enumerate(lin.coordinates[lin.fitted :])}
     played = _spread([t for t in trials if t.kind == "gait"] or trials)
     sizes, unseen = {}, []

@@ -93,6 +93,7 @@ def replay_manoeuvre(
     lead_s = 0.0 if before is None else REPLAY.cycles_before * before.period_s
     whole = valves if before is None else Timeline.join([Timeline.of_gait(before, lead_s), valves])
     run = integrator(robot, model)
+    run.check_played_once()
     path = run.integrate(whole, run.rest())
     step_s = whole_step_s(whole.end_s, settings)
     snake = Snake(body_of(robot), step_s=step_s, pairs=settings.pairs, pull=pull_of(robot, room=False))

@@ -105,6 +105,7 @@ def run(options: argparse.Namespace) -> Answer:
             "manoeuvres are not optimized on the compliant model: give --model complex or simplified"
         )
     run = integrator(robot.with_values(valve_delay_s=0.0), model)
+    run.check_played_once()  # before any gaits are optimized
     task = _task(options, run, robot, model)
     gaits = [entry.gait for entry in _table(options, robot, model).gaits]
     found = find(

@@ -77,8 +77,8 @@ def certify(run: Integrator, task: Task, plan: ValvePlan) -> tuple[Certificate, 
     coarse = run.integrate(plan.timeline(), task.start.state, coarse_m_s)
     fine = run.integrate(plan.timeline(), task.start.state, coarse_m_s / MANOEUVRE_CERTIFICATE.finer)
     apart = (coarse.final[POSE] - fine.final[POSE]) * (1.0, 1.0, CONSTRAINT.lever * run.robot.length_m)
-    # the finer motion's own error is at most this share of the difference of the two
-    error = float(np.hypot(*apart[:2]) + abs(apart[2])) / MANOEUVRE_CERTIFICATE.ratio
+    # errors a ratio apart differ by ratio - 1 of the smaller, the finer motion's
+    error = float(np.hypot(*apart[:2]) + abs(apart[2])) / (MANOEUVRE_CERTIFICATE.ratio - 1)
     shot = Shot(plan, fine.time_s, seen_states(run, fine))
     # the whole tolerances: the optimization kept inside of them for ticks and errors
     rows = RowMaker(run, task, inside=1.0)

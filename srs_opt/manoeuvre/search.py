@@ -71,9 +71,12 @@ def find(
 
     Raises
     ------
+    InputError
+        If an effect of the robot goes by a gait's frequency.
     NoAnswerError
         If nothing that reaches the end is found.
     """
+    run.check_played_once()
     satisfied_m = MANOEUVRE_SOLVER.satisfied * run.robot.length_m
     solver = Solver(run, task)
     rough = Solver(run, task, MANOEUVRE_SEARCH.rough_step_s)

@@ -160,7 +160,7 @@ def _course(run: Integrator, start: np.ndarray, plan: ValvePlan, step_s: float |
     timeline = plan.timeline().at_one_pressure()
     # one step per phase at least, so that none straddles a switch
     mesh = Mesh.uniform(timeline.duration_s, step_s or MANOEUVRE_SOLVER.step_s, 1)
-    # a manoeuvre has no frequency: effects that depend on one take 1 Hz
+    # a manoeuvre has no frequency, and robots with effects that go by one are refused: any will do
     p = run.pack(float(timeline.pressure_kpa[0]), 1.0)
     return Course(start, mesh.h_s, timeline.valve.T[mesh.phase], p)
 

@@ -48,6 +48,13 @@ class Actuator:
         self.linear = not any(effect.nonlinear_actuator for effect, _ in parameters.effects)
         self.memories = sum(effect.remembers for effect, _ in parameters.effects)
         self.timed = any(effect.timed for effect, _ in parameters.effects)
+        frequency = parameters["frequency_hz"]
+        # effects that go by the gait's frequency, which valves that are played once do not have
+        self.by_frequency = tuple(
+            effect.name
+            for effect, e in parameters.effects
+            if effect.gain and ca.depends_on(ca.SX(effect.gain(e, frequency)), frequency)
+        )
         self.states = self.segments * (2 + self.memories) + self.timed
 
     def unstack(self, vector: ca.SX) -> ActuatorState:

@@ -83,11 +83,12 @@ class StateLayout:
     def adopt(self, state: np.ndarray, source: StateLayout) -> np.ndarray:
         """Return the state (size,) of this layout that another model of the same snake stands for.
 
-        Place, speed, bends and the actuators' curvatures are taken over; memories of effects start anew, and
-        work is counted from here. Where this model prescribes the curvature, it is that of the actuators.
+        Place, velocity, bends and the actuators' curvatures are taken over; memories of effects start anew,
+        and work is counted from here. Where this model prescribes the curvature, it is that of the actuators.
+        The yaw momentum stays, which is right between the complex and the compliant model alone, with bends
+        alike: `Integrator.adopt` keeps the yaw rate.
         """
         adopted, known = np.zeros(self.size), 2 * self.segments
-        # the complex and the compliant model share their yaw momentum; the simplified model's is another
         adopted[:WORK] = state[:WORK]
         adopted[self.kappa.start : self.dkappa.stop] = state[source.kappa.start : source.dkappa.stop]
         first, origin = self.actuator.start, source.actuator.start

@@ -12,16 +12,13 @@ rest: the motion is simulated until it has all but settled, and Newton only fini
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
 
-import casadi as ca
 import numpy as np
 
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait
-from srs_opt.model.parameters import Structure
-from srs_opt.model.registry import build
 from srs_opt.model.state import POSE, WORK
+from srs_opt.model.yaw import yaw_momenta
 from srs_opt.orbit.actuators import periodic_actuators
 from srs_opt.orbit.period_map import PeriodMap, period_map, plain_period_map
 from srs_opt.orbit.settings import ORBIT
@@ -298,16 +295,9 @@ def _settled(cycle: Cycle, mesh: Mesh, tolerance: float) -> Search[tuple[np.ndar
     return dynamic, mesh
 
 
-@lru_cache(maxsize=32)
-def _inertia_function(structure: Structure) -> ca.Function:
-    parameters, mechanics, _ = build(structure)
-    momenta = (mechanics.yaw_inertia(), mechanics.yaw_momentum_of_shape())
-    outputs = [mechanics.unloaded(v) for v in momenta]
-    return ca.Function(
-        "inertia", [mechanics.kappa, mechanics.dkappa, parameters.vector], outputs, {"cse": True}
-    )
-
-
 def _inertia(run: Integrator, act: np.ndarray, p: np.ndarray) -> float:
-    s = run.structure.segments
-    return float(_inertia_function(run.structure)(act[:s], act[s : 2 * s], p)[0])
+    # a body whose bends are those without load
+    x = np.zeros(run.states)
+    x[run.layout.actuator] = act
+    x[run.layout.kappa] = act[: run.structure.segments]
+    return float(yaw_momenta(run.structure)(x, p)[0])

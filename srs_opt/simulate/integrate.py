@@ -7,10 +7,11 @@ from functools import lru_cache
 
 import numpy as np
 
-from srs_opt.errors import NoAnswerError
+from srs_opt.errors import InputError, NoAnswerError
 from srs_opt.model.parameters import Structure, valve_delay_s
 from srs_opt.model.registry import build, state_layout
-from srs_opt.model.state import POSE, VELOCITY, WORK, StateLayout
+from srs_opt.model.state import POSE, VELOCITY, WORK, YAW_MOMENTUM, StateLayout
+from srs_opt.model.yaw import yaw_momenta
 from srs_opt.robot import Robot
 from srs_opt.simulate.adaptive import NonFiniteMotionError, adapted, finite_steps
 from srs_opt.simulate.batched import Search, StepRequest, run_one
@@ -104,6 +105,33 @@ class Integrator:
         state = np.zeros(self.states)
         state[POSE] = x_m, y_m, heading_rad
         return state
+
+    def check_played_once(self) -> None:
+        """Raise InputError if an effect goes by a gait's frequency: valves played once have none."""
+        if self.actuator.by_frequency:
+            raise InputError(
+                f"robot '{self.robot.name}': effect '{self.actuator.by_frequency[0]}' goes by a gait's "
+                "frequency, which valves that are played once do not have: leave it out, and give "
+                "curvature_per_pressure_1_m_kpa as it is while they are played"
+            )
+
+    def adopt(self, state: np.ndarray, source: Integrator) -> np.ndarray:
+        """Return the state (nx,) of this model that a state of another model of the same snake stands for.
+
+        As `StateLayout.adopt`; the yaw rate stays, so that the yaw momentum becomes this model's own.
+        """
+        adopted = self.layout.adopt(state, source.layout)
+        inertia, of_shape = self._yaw_momenta(adopted)
+        given, of_given_shape = source._yaw_momenta(state)
+        if (inertia, of_shape) != (given, of_given_shape):  # alike ones keep every bit
+            yaw_rate = (state[YAW_MOMENTUM] - of_given_shape) / given
+            adopted[YAW_MOMENTUM] = inertia * yaw_rate + of_shape
+        return adopted
+
+    def _yaw_momenta(self, state: np.ndarray) -> tuple[float, float]:
+        # neither depends on pressure and frequency
+        inertia, of_shape = yaw_momenta(self.structure)(state, self.pack(1.0, 1.0))
+        return float(inertia), float(of_shape)
 
     def steps(
         self, x: np.ndarray, mesh: Mesh, valve: np.ndarray, p: np.ndarray

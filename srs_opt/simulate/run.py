@@ -121,9 +121,16 @@ def simulate(
 def simulate_valves(
     robot: Robot, timeline: Timeline, model: str | None = None, start: np.ndarray | None = None
 ) -> Simulation:
-    """Play valves once, from `start` (nx,) or from the straight robot at rest; no mean speeds."""
+    """Play valves once, from `start` (nx,) or from the straight robot at rest; no mean speeds.
+
+    Raises
+    ------
+    InputError
+        If an effect of the robot goes by a gait's frequency.
+    """
     before = compiled.compile_seconds
     run = Integrator(robot, model)
+    run.check_played_once()
     began = time.perf_counter()
     trajectory = run.integrate(timeline, run.rest() if start is None else start)
     wall = time.perf_counter() - began

@@ -5,6 +5,7 @@ import pytest
 from scipy import optimize
 
 from srs_opt.calibrate.normal_equations import bounded_solve, trial_normal_equations
+from srs_opt.calibrate.objective import projected
 from srs_opt.calibrate.whiten import Whitening
 
 
@@ -144,3 +145,16 @@ def test_scatter_that_is_held_is_a_constant_of_the_elimination():
     assert held.matrix == pytest.approx(matrix, rel=1e-8, abs=1e-6)
     assert held.back[1, -1] == pytest.approx(0.07)
     assert np.all(held.back[1, :-1] == 0)
+
+
+def test_what_is_projected_out_does_not_depend_on_units():
+    """Coordinates in units 1e9 apart, as stiffnesses and time constants are."""
+    jacobian, _ = problem()
+    units = np.array([1e-6, 1.0, 1e3, 1.0, 1.0])
+    total = (jacobian * units).T @ (jacobian * units)
+    inverse, left = projected(total, 3, np.zeros(3))
+    basis, _ = np.linalg.qr(jacobian[:, :3])
+    rest = jacobian[:, 3:] - basis @ (basis.T @ jacobian[:, 3:])
+    assert left == pytest.approx(rest.T @ rest, rel=1e-9)
+    own = np.linalg.inv(jacobian[:, :3].T @ jacobian[:, :3])
+    assert inverse * np.outer(units[:3], units[:3]) == pytest.approx(own, rel=1e-9)

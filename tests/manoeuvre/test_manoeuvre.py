@@ -3,12 +3,17 @@
 import csv
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from srs_opt.errors import InputError
 from srs_opt.gait import published_wave
 from srs_opt.manoeuvre.__main__ import main
+from srs_opt.manoeuvre.certificate import certify
+from srs_opt.manoeuvre.search import find
+from srs_opt.manoeuvre.settings import MANOEUVRE_CERTIFICATE
 from srs_opt.manoeuvre.shooting import shoot, shoot_with_sensitivity
 from srs_opt.manoeuvre.space import load_space
 from srs_opt.manoeuvre.starts import playable
@@ -17,6 +22,7 @@ from srs_opt.manoeuvre.valves import ValvePlan, ValveRow
 from srs_opt.orbit.body import integrator
 from srs_opt.robot import wpi_srs
 from srs_opt.simulate.__main__ import main as simulate
+from srs_opt.simulate.run import simulate_valves
 
 ROBOT = wpi_srs()
 QUICK = ["--starts", "2", "--populations", "0", "--shakes", "0", "--quiet", "--json"]
@@ -43,6 +49,44 @@ def test_slopes_are_those_of_differences():
         wanted = (one.states[-1] - other.states[-1]) / 2e-5
         found = shot.sensitivity[-1, :, k]
         assert np.abs(found - wanted)[:6].max() < 0.05 * np.abs(wanted[:6]).max() + 1e-3
+
+
+class WithErrors:
+    """An integrator whose motions end a given way from the true end, one after the other."""
+
+    def __init__(self, run, errors_m):
+        self._run, self._errors_m = run, list(errors_m)
+
+    def __getattr__(self, name):
+        return getattr(self._run, name)
+
+    def integrate(self, timeline, state, tolerance):
+        path = self._run.integrate(timeline, state, tolerance)
+        return replace(path, final=path.final + self._errors_m.pop(0) * np.eye(path.final.size)[0])
+
+
+def test_the_certificate_s_bound_covers_the_finer_motion_s_error():
+    """Errors with the least ratio, of one sign: their difference is all that the two motions tell."""
+    run, finer_m = integrator(ROBOT), 1e-3
+    plan = ValvePlan.of_gaits((published_wave(ROBOT, 2.0, 50.0, 0.3).gait(),), 0.3)
+    task = Task(Start.at_rest(run), End(past_m=0.1))
+    off = WithErrors(run, (MANOEUVRE_CERTIFICATE.ratio * finer_m, finer_m))
+    certificate, _ = certify(off, task, plan)
+    assert certificate.error_m == pytest.approx(finer_m, rel=1e-2)
+    assert certificate.error_m > 0.999 * finer_m
+
+
+def test_a_supply_that_droops_with_the_frequency_is_refused():
+    """Its loss at a gait's frequency is known; a manoeuvre has no frequency."""
+    droops = ROBOT.with_values(effects=[{"name": "supply_droop", "per_hz": 0.1}])
+    plan = ValvePlan.of_gaits((published_wave(ROBOT, 2.0, 50.0, 0.3).gait(),), 0.3)
+    with pytest.raises(InputError, match=r"supply_droop.*frequency"):
+        simulate_valves(droops, plan.timeline())
+    run = integrator(droops)
+    with pytest.raises(InputError, match=r"supply_droop.*frequency"):
+        find(run, Task(Start.at_rest(run), End(past_m=0.1)), [])
+    stiffens = ROBOT.with_values(effects=[{"name": "curvature_stiffening", "per_curv2": 6e-4}])
+    integrator(stiffens).check_played_once()
 
 
 def test_a_quarter_turn_at_rest_replays(tmp_path, capsys):

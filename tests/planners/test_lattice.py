@@ -1,13 +1,16 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapely
 from planner_rooms import corridor, gate, maze_of
 
-from planners.plan.certify import certify
+from planners.plan.certify import RATIO, Certifier, certify
 from planners.plan.solve import LatticeSolver, solve_with_lattice
 from planners.search.beam import BeamSettings
 from planners.search.clearance import BodyClearance
 from planners.search.lattice import LatticeSearch, LatticeSettings
+from srs_opt.simulate.timeline import Timeline
 
 
 def test_corridor_is_solved_and_certified(problem_in):
@@ -153,3 +156,15 @@ def test_cycles_side_by_side_are_those_alone(problem_in):
     )
     for gait, cycle in enumerate(together):
         assert np.array_equal(cycle.state, problem.simulate(state, problem.motion.rest, gait).state)
+
+
+def test_the_certificate_s_bound_covers_the_finer_integration_s_error(problem_in):
+    """Errors with the least ratio, of one sign: their difference is all that the two integrations tell."""
+    problem, finer_m = problem_in(corridor(0.3, 2.0)), 1e-4
+    run, gait = problem.integrator, problem.gaits.gaits[0].gait
+    true = run.integrate(Timeline.of_gait(gait, gait.period_s), run.rest())
+    fine, coarse = (
+        [replace(true, pose=true.pose + [off_m, 0.0, 0.0])] for off_m in (finer_m, RATIO * finer_m)
+    )
+    _, error = Certifier(problem)._error_m(fine, coarse)
+    assert error == pytest.approx(finer_m, rel=1e-6)
