@@ -18,6 +18,7 @@ from srs_opt.orbit.steady import steady_gait
 Array = NDArray[np.float64]
 NODES = 700_000
 HALVINGS = 14  # of the clearance range: 0.1 mm in a metre
+ALONG_BODY = 65  # points of the straight body whose passages are followed
 SPARE = 0.1  # of the body's width
 SLOWEST = 0.0424  # body lengths per second; a gait slower than this is none
 WEAKER = (0.85, 0.7, 0.55, 0.4)  # pressures tried outside the table, relative to its slimmest gait
@@ -155,9 +156,35 @@ def explain(problem: Problem) -> Explanation:
 
 
 def no_body_fits(problem: Problem) -> bool:
-    """Whether walls separate start and goal, or even the widest route is narrower than the body needs."""
-    tightest = tightest_place(problem)
-    return tightest is None or tightest.width_m < problem.robot.body_width_m + 2 * problem.margin_m
+    """Whether it is proven that no body with its margin gets from the start to the goal.
+
+    A point of the body's centre line keeps half the width and the margin from walls all the way, and passes
+    from node to node of the distance field where these are no nearer than that less the field's error. At the
+    goal some point of the centre line is within its length over pi of the centre of mass: that lies on a chord
+    of the line, and an arc that keeps farther from it than that is longer than the line.
+    """
+    from scipy.ndimage import label
+
+    half = problem.robot.body_width_m / 2
+    keeps_m = half + min(problem.margin_m, problem.margin_m + problem.start_slack_m)
+    start, reach = problem.start, problem.robot.length_m / 2 - half
+    along = np.linspace(-reach, reach, ALONG_BODY)
+    body = np.stack(
+        [start.x + along * math.cos(start.heading), start.y + along * math.sin(start.heading)], axis=1
+    )
+    # the coarser field, which is there, often decides
+    for field in (problem.field, problem.finer.field):
+        labels, _ = label(field.values >= keeps_m - field.error_m, structure=np.ones((3, 3)))
+        origin, spacing = np.array(field.origin), field.resolution
+        column, row = np.round((body - origin) / spacing).astype(int).T
+        inside = (row.clip(0, labels.shape[0] - 1), column.clip(0, labels.shape[1] - 1))
+        mine = np.unique(labels[inside])
+        rows, columns = np.nonzero(np.isin(labels, mine[mine > 0]))
+        nodes = origin + spacing * np.stack([columns, rows], axis=-1)
+        near_m = problem.robot.length_m / math.pi + spacing
+        if not nodes.size or problem.goal.distance(nodes).min() > near_m:
+            return True
+    return False
 
 
 def narrower_than_any_gait(problem: Problem) -> bool:

@@ -25,7 +25,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple
 
-from planners.plan.solve import LEAST_SLACK, LatticeSolver
+from planners.plan.solve import LEAST_SLACK, LatticeSolver, RunSolver
 from planners.search.lattice import LatticeSettings
 from planners.search.ompl_control import MakePlanner, as_ompl_planner, run_planner
 from planners.search.ompl_geometric import search_geometric
@@ -38,7 +38,7 @@ ALIASES = {"kpiece": "kpiece1"}
 CURVES = ("dubins", "rs")
 HALVINGS = 3  # of cells near walls, in the second lattice search
 # what `auto` asks, in this order; OMPL's only where our own searches have found nothing
-OURS = ("lattice", "fine")
+OURS = ("lattice", "runs", "fine")
 OMPLS = ("dubins-rrtconnect", "rs-rrtconnect", "kpiece1", "est", "rrt")
 UNUSABLE = ("aorrtc",)  # crashes its process
 
@@ -122,7 +122,7 @@ def _fine(problem: Problem, **options: Any) -> LatticeSolver:
 
 _known: dict[str, Planner] = {
     name: Planner(name, partial(_ours, solver), solver=solver)
-    for name, solver in (("lattice", LatticeSolver), ("fine", _fine))
+    for name, solver in (("lattice", LatticeSolver), ("runs", RunSolver), ("fine", _fine))
 }
 
 

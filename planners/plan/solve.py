@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 from planners.plan.answer import Plan, PlanResult, Status
 from planners.plan.certify import Certificate, Certifier
@@ -13,6 +14,7 @@ from planners.plan.explain import narrower_than_any_gait, no_body_fits
 from planners.search.beam import BeamSearch, BeamSettings
 from planners.search.lattice import LatticeSearch, LatticeSettings
 from planners.search.problem import ROUNDING_M, Problem
+from planners.search.runs import RUNS, RunSearch, RunSettings
 from planners.search.tree import Root, at_rest
 
 CHUNK = 50  # nodes between looks at the clock
@@ -55,6 +57,8 @@ class LatticeSolver:
     tell : callable
         Gets messages about the progress.
     """
+
+    name = "lattice"
 
     def __init__(
         self,
@@ -107,7 +111,7 @@ class LatticeSolver:
             certificate = self.certifier.certify(gaits)
             self.counts["certificates"] += 1
             if certificate.passed:
-                return self._answer("solved", None, Plan("lattice", gaits, certificate))
+                return self._answer("solved", None, Plan(self.name, gaits, certificate))
             self._mend(gaits, certificate)
         return self._answer("not_found", "plans were found but none passed the certificate")
 
@@ -128,12 +132,16 @@ class LatticeSolver:
 
     def _exhausted(self) -> str:
         """Say at what resolution nothing was found."""
-        s, length = self.settings, self.problem.robot.length_m
+        s, length = self._resolution, self.problem.robot.length_m
         return (
             f"nothing found at this resolution: states within {1e3 * s.cell * length:.0f} mm, "
             f"{math.degrees(s.course_rad):.0f} deg and {s.speed * length:.2f} m/s of each other were taken "
             "for one, so a way that only one of them has may have slipped through"
         )
+
+    @property
+    def _resolution(self) -> LatticeSettings | RunSettings:
+        return self.settings
 
     def _too_narrow(self) -> bool:
         """Judge the widths, once, when the search does not come on."""
@@ -185,7 +193,7 @@ class LatticeSolver:
         self.kept = kept
         self.search = self._search_from(here)
 
-    def _search_from(self, here: Root) -> BeamSearch | LatticeSearch:
+    def _search_from(self, here: Root) -> BeamSearch | LatticeSearch | RunSearch:
         """Return a new search, with the slack that certificates have asked for."""
         if self.beams:
             beam = self.beams[0]
@@ -198,6 +206,30 @@ class LatticeSolver:
         effort["expanded"] += self.search.expanded
         effort["simulated"] += self.search.simulated
         return PlanResult(status, plan, reason, time.perf_counter() - self.began, effort)
+
+
+class RunSolver(LatticeSolver):
+    """The same with the search over runs of one gait (`planners.search.runs`): for ways with little room.
+
+    Parameters
+    ----------
+    problem : Problem
+    options
+        As `LatticeSolver` has them, from `time_limit_s` on.
+    """
+
+    name = "runs"
+
+    def __init__(self, problem: Problem, **options: Any) -> None:
+        super().__init__(problem, beams=(), **options)
+        self.refined = True  # there is one resolution only
+
+    @property
+    def _resolution(self) -> LatticeSettings | RunSettings:
+        return RUNS
+
+    def _search_from(self, here: Root) -> RunSearch:
+        return RunSearch(self.problem, replace(RUNS, slack=RUNS.slack + self.more_slack), here)
 
 
 def solve_with_lattice(

@@ -24,7 +24,7 @@ def without_ompl(monkeypatch):
     monkeypatch.setitem(sys.modules, "ompl", None)
 
 
-@pytest.mark.parametrize("name", ["lattice", "fine", "rrt", "est", "kpiece1", "forward"])
+@pytest.mark.parametrize("name", ["lattice", "runs", "fine", "rrt", "est", "kpiece1", "forward"])
 def test_every_planner_is_a_planner_of_ompl_on_the_same_problem(problem_in, name):
     problem = problem_in(corridor(0.5))
     seeded(0)
