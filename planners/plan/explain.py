@@ -159,9 +159,9 @@ def no_body_fits(problem: Problem) -> bool:
     """Whether it is proven that no body with its margin gets from the start to the goal.
 
     A point of the body's centre line keeps half the width and the margin from walls all the way, and passes
-    from node to node of the distance field where these are no nearer than that less the field's error. At the
-    goal some point of the centre line is within its length over pi of the centre of mass: that lies on a chord
-    of the line, and an arc that keeps farther from it than that is longer than the line.
+    from node to node of the distance field where these are no nearer than that less the field's error. At
+    the goal some point of the centre line is within its length over pi of the centre of mass: that lies on a
+    chord of the line, and an arc that keeps farther from it than that is longer than the line.
     """
     from scipy.ndimage import label
 

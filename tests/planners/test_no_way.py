@@ -20,7 +20,7 @@ def wrapped(problem, gaits, room_m):
     c = certify(problem, gaits)
     assert not c.reason or "short" in c.reason
     straight = shapely.buffer(shapely.linestrings(c.lines[0]), 0.02 + room_m)
-    bodies = [straight, *shapely.buffer(shapely.linestrings(c.lines[::3]), 0.02 + room_m)]
+    bodies = [straight, *shapely.buffer(shapely.linestrings(c.lines), 0.02 + room_m)]
     free = shapely.union_all(bodies)
     box = tuple(float(v) for v in shapely.buffer(free, 0.02).bounds)
     solid = shapely.get_parts(shapely.box(*box) - free)
