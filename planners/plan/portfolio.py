@@ -82,10 +82,14 @@ def _rounds(problem: Problem, request: PlanRequest, tell: Tell) -> PlanResult:
     ours = [make(problem, time_limit_s=request.time_limit_s, tell=tell) for make in makers if make]
     began = time.perf_counter()
     for turn in range(ROUNDS):
+        narrow = None
         for solver in ours:
             result = solver.run(FIRST_NODES * 2**turn)
-            if result.plan is not None or result.status == "infeasible" or result.reason == TOO_NARROW:
+            if result.plan is not None or result.status == "infeasible":
                 return result
+            narrow = result if result.reason == TOO_NARROW else narrow
+        if narrow is not None:  # all of ours have looked at it: others need more room
+            return narrow
         if all(solver.ended for solver in ours):
             return result
         left = request.time_limit_s - (time.perf_counter() - began)

@@ -223,6 +223,7 @@ class RunSolver(LatticeSolver):
     def __init__(self, problem: Problem, **options: Any) -> None:
         super().__init__(problem, beams=(), **options)
         self.refined = True  # there is one resolution only
+        self.judged = True  # a body on its own track passes where the band that a gait sweeps does not
 
     @property
     def _resolution(self) -> LatticeSettings | RunSettings:

@@ -180,18 +180,18 @@ class RunSearch:
         self.expanded += len(nodes)
         problem, s, motion, tree = self.problem, self.settings, self.problem.motion, self._tree
         states = np.array([tree.cycle[node].state[: FORWARD + 1] for node in nodes])
-        begin, speeds = states[:, [X, Y, HEADING]], [float(v) for v in states[:, FORWARD]]
-        before = [tree.gait[node] for node in nodes]
+        begin, speeds = states[:, [X, Y, HEADING]], states[:, FORWARD]
+        before = np.array([tree.gait[node] for node in nodes])
         end, speed = motion.ends(begin, before, speeds)
         # of a bent body the centre of mass may be where the map has a wall: the body decides, not the map
         left = problem.to_goal.at(end[..., :2])
         straight = problem.goal.distance(end[..., :2]) / problem.cost_model.top_speed_m_s
         left = np.where(left < BLOCKED_S / 2, left, straight)
-        owner, now = np.nonzero([motion.may_follow(gait) for gait in before])
+        owner, now = np.nonzero([motion.may_follow(int(gait)) for gait in before])
         if not owner.size:
             return
-        earlier = [before[k] for k in owner]
-        pose = motion.poses(begin[owner], earlier, [speeds[k] for k in owner], now)
+        earlier = before[owner]
+        pose = motion.poses(begin[owner], earlier, speeds[owner], now)
         lines = motion_lines(problem, earlier, pose, now)
         spare = problem.body.estimate(lines).min(axis=1) - problem.margin_m
         unsure = problem.field.error_m + s.table_error * problem.robot.length_m
