@@ -58,7 +58,7 @@ def test_any_number_of_processes_finds_the_same_numbers(tmp_path, capsys):
 
 @pytest.mark.slow
 def test_two_hidden_effects_are_named_one_after_the_other(tmp_path, capsys):
-    truth = small_set(tmp_path / "set", ("tether_drag", "gap_bending"), trials=12)
+    truth = small_set(tmp_path / "set", ("tether_drag", "gap_bending"))
     names = tmp_path / "names.yaml"
     names.write_text("[tether_drag]\n")
     first = ask(discrepancy, tmp_path / "set", capsys, "--effects", names, out=tmp_path / "1")
