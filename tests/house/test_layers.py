@@ -92,7 +92,7 @@ def layer(module: str) -> int:
 
 
 TOPS = ("srs_opt", "planners")  # front doors: they may name everything, and nothing imports them
-LIBRARY = sorted(m for m in imports() if not is_command(m) and m not in TOPS)
+LIBRARY = sorted(m for m in map(module_name, sources()) if not is_command(m) and m not in TOPS)
 
 
 @pytest.mark.parametrize("module", LIBRARY)

@@ -3,6 +3,7 @@
 import contextlib
 import json
 import math
+from functools import lru_cache
 
 import layout_writers as write
 import numpy as np
@@ -34,6 +35,7 @@ ROW = f"m1,1.5,48,0.4,1.570796,{START}"
 MIXED = [3, 0, 4, 1, 2]  # order of the markers in the file
 
 
+@lru_cache
 def texts():
     points = lab_tracks()[1][:, MIXED]
     return {

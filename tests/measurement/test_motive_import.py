@@ -2,6 +2,7 @@
 
 import json
 import math
+from functools import lru_cache
 
 import numpy as np
 import pytest
@@ -28,9 +29,14 @@ TILTED = TILTED * np.sign(np.linalg.det(TILTED))
 TILTED = TILTED * np.array([[1, 1, 1]]) if TILTED[2, 1] > 0 else TILTED * np.array([[-1], [1], [-1]])
 
 
+@lru_cache
+def lab_path(offset, lag):
+    return run(Truth(), LabTrial("a", 1.5, 48.0, offset, lag, 0.7, 4.2), np.maximum(TIME - START, 0))
+
+
 def lab_tracks(offset=0.4, sd=3e-4, seed=0, lag=math.pi / 2):
     rng = np.random.default_rng(seed)
-    path = run(Truth(), LabTrial("a", 1.5, 48.0, offset, lag, 0.7, 4.2), np.maximum(TIME - START, 0))
+    path = lab_path(offset, lag)
     exact = np.stack([path.x, path.y], axis=-1)
     points = exact + np.array([0.3, -0.2]) + sd * rng.normal(size=exact.shape)
     points[rng.random(points.shape[:2]) < 0.05] = np.nan
