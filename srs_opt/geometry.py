@@ -77,6 +77,14 @@ def wrapped(angle: Any) -> Any:
     return (angle + math.pi) % (2 * math.pi) - math.pi
 
 
+def turn_onto(points: Any, onto: Any, axis: int | None = None) -> Any:
+    """Return the angle of the best rotation (least squares) of centred points onto others.
+
+    Both as complex numbers, where it is the argument of sum onto conj(points), over `axis` or all.
+    """
+    return np.angle((onto * np.conj(points)).sum(axis=axis))
+
+
 def turning_angles(points: np.ndarray) -> Array:
     """Return by how much polylines of points (..., M, 2) turn at their inner points, (..., M - 2), left +."""
     chords = np.diff(points, axis=-2)

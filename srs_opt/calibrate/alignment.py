@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from srs_opt.calibrate.data_settings import ALIGNMENT
-from srs_opt.geometry import quarter_turn, rotation_matrix
+from srs_opt.geometry import quarter_turn, rotation_matrix, turn_onto
 
 FREE = 4  # unknowns per trial
 
@@ -101,7 +101,6 @@ def _rigid(track: np.ndarray, points: np.ndarray, later_s: float) -> Alignment:
     z, p = (np.ascontiguousarray(v).reshape(len(v), -1, 2) @ np.array([1, 1j]) for v in (track, points))
     seen = np.isfinite(z)
     z, p = z[seen], p[seen]
-    # in the complex plane the best rotation is the argument of sum z conj(p), both centred
-    turn = float(np.angle(((z - z.mean()) * np.conj(p - p.mean())).sum()))
+    turn = float(turn_onto(p - p.mean(), z - z.mean()))
     shift = z.mean() - np.exp(1j * turn) * p.mean()
     return Alignment(later_s, turn, np.array([shift.real, shift.imag]))

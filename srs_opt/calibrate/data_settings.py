@@ -194,6 +194,14 @@ class OutlyingTrialSettings:
         Of a trial that a fit did not see: its own friction and curvature go no further.
     worst_ratio : float
         Times the usual misfit that a trial must have in the fit to all, to be left out as a test.
+    most_share : float
+        Of all trials that may be set aside: with more the others are hardly the usual ones, and each costs
+        a fit; one trial always may.
+    scatter_rounds : int
+        Gauss-Newton steps at most to the scatter of a trial that a fit did not see, each a linearisation.
+    settled_sd : float
+        Step of it, over its deviation, at which that ends. Smaller: a round more; larger: misfit that belongs
+        to the scatter counts against the trial.
     """
 
     least_left: int = 3
@@ -201,6 +209,9 @@ class OutlyingTrialSettings:
     notable_misfit: float = 0.5
     most_scatter_sd: float = 4.0
     worst_ratio: float = 3.0
+    most_share: float = 0.25
+    scatter_rounds: int = 3
+    settled_sd: float = 0.05
 
 
 @dataclass(frozen=True)

@@ -152,12 +152,16 @@ class PriorSettings:
         Change of the logarithm of an effect's scale that begins to matter.
     tow_sd_n : float
         Of a force balance, beside the scatter of friction from pull to pull.
+    log_nearness_sd : float
+        Of the logarithm of how near the point is at which an effect of the room sits: a factor of two either
+        way. Smaller: a point elsewhere is not found; larger: one far away explains anything smooth.
     """
 
     friction_speed_range_m_s: tuple[float, float] = (0.0003, 0.003)
     fixed_sd: float = 1e-9
     log_typical: float = 0.3
     tow_sd_n: float = 0.002
+    log_nearness_sd: float = 0.7
 
 
 @dataclass(frozen=True)
@@ -172,11 +176,15 @@ class CalibrationReportSettings:
         Root mean square misfit over the noise from which it is said that the model does not explain the data.
     uninformed_share : float
         Posterior over prior deviation above which the data told nothing.
+    named_part : float
+        Part of a value in such a direction (of unit length) from which on it is named. Smaller: long products
+        of values that hardly matter; larger: a direction of many values would have no name.
     """
 
     off_bench_sd: float = 3.0
     unexplained_misfit: float = 1.1
     uninformed_share: float = 0.9
+    named_part: float = 0.3
 
 
 FIT = FitSettings()

@@ -75,7 +75,7 @@ class Form:
         """Coordinates that mean nothing at zero size: logarithms, within a spread of the typical one."""
         found = [(p.name, math.log(p.typical), p.spread) for p in self.logs]
         if self.point:
-            found.append(("nearness", -math.log(self._distance()), 0.7))
+            found.append(("nearness", -math.log(self._distance()), PRIOR.log_nearness_sd))
         name = self.effect.name
         return tuple(
             Coordinate(self.name(f"log_{part}"), name, PRIOR.log_typical, -INFINITY, spread, start, log=True)

@@ -20,7 +20,7 @@ def own_scatter(experiment: Experiment, fit: Fit, trials: Sequence[Trial]) -> Po
     """Return a fit's point with the most probable scatter of trials that it did not see."""
     own = _own(fit)
     point = Point(fit.point.values, {})
-    for _ in range(3):
+    for _ in range(OUTLYING_TRIAL.scatter_rounds):
         equations = experiment.normal_equations(point, own, trials)
         moved, settled = {}, True
         for trial in trials:
@@ -31,7 +31,8 @@ def own_scatter(experiment: Experiment, fit: Fit, trials: Sequence[Trial]) -> Po
             now = point.scatter.get(trial.name, np.zeros(back.shape[0]))
             limit = OUTLYING_TRIAL.most_scatter_sd * normal.scatter_sd
             moved[trial.name] = np.clip(now + back[:, -1], -limit, limit)
-            settled &= bool(np.abs(moved[trial.name] - now).max() < 0.05 * normal.scatter_sd.min())
+            moves = np.abs(moved[trial.name] - now).max()
+            settled &= bool(moves < OUTLYING_TRIAL.settled_sd * normal.scatter_sd.min())
         if settled:
             break
         point = Point(fit.point.values, moved)
@@ -53,7 +54,7 @@ def outlying_trials(
         Names of trials -> the fit to the others, None where there is none.
     """
     aside: dict[str, str] = {}
-    for _ in range(max(1, len(trials) // 4)):
+    for _ in range(max(1, int(OUTLYING_TRIAL.most_share * len(trials)))):
         rest = [t for t in trials if t.name not in aside]
         misfit = {
             t.name: fit.equations[t.name].misfit / max(fit.equations[t.name].count, 1) - 1 for t in rest

@@ -154,7 +154,9 @@ def unidentifiable(coordinates: list[Coordinate], covariance: np.ndarray) -> tup
     found = []
     for value, vector in zip(values, vectors.T):
         if math.sqrt(max(value, 0.0)) >= CALIBRATION_REPORT.uninformed_share:
-            parts = [(abs(w), w, c.name) for w, c in zip(vector, coordinates) if abs(w) > 0.3]
+            # the largest have a name whatever they are: of twelve alike values each has a part of 0.29
+            least = min(CALIBRATION_REPORT.named_part, 0.99 * float(np.abs(vector).max()))
+            parts = [(abs(w), w, c.name) for w, c in zip(vector, coordinates) if abs(w) > least]
             parts.sort(reverse=True)
             # in logarithms a direction is a product of powers; its sign is that of the largest part
             sign = math.copysign(1.0, parts[0][1])

@@ -20,7 +20,7 @@ from srs_opt.simulate.batched import Search, StepRequest, run_one
 from srs_opt.simulate.integrate import step_kernel
 from srs_opt.simulate.kernel import Kernel
 from srs_opt.simulate.mesh import Mesh
-from srs_opt.simulate.settings import MeshSettings
+from srs_opt.simulate.settings import INTEGRATION, MeshSettings
 from srs_opt.simulate.timeline import Timeline
 
 
@@ -279,7 +279,7 @@ def _cycles(timeline: Timeline, period_s: float) -> list[Timeline]:
     pieces, start = [], 0
     boundary = period_s
     for k, end in enumerate(ends):
-        if end >= boundary - 1e-9 or k - start >= 60 or k == ends.size - 1:
+        if end >= boundary - 1e-9 or k - start >= INTEGRATION.longest_phases or k == ends.size - 1:
             pieces.append(timeline.part(slice(start, k + 1)))
             start = k + 1
             # the next whole period, where this end is one but for rounding, too

@@ -9,6 +9,7 @@ import numpy as np
 
 from srs_opt.calibrate.noise import track_of
 from srs_opt.discrepancy.gap_settings import SEAL
+from srs_opt.geometry import turn_onto
 from srs_opt.measurement.records import Trial
 
 
@@ -81,9 +82,8 @@ def _advance(trial: Trial, track: np.ndarray) -> tuple[float, float] | None:
         bodies = [
             np.where(both, z - (z.sum(axis=1) / np.maximum(seen, 1))[:, None], 0.0) for z in (now, then)
         ]
-        # in the complex plane the best rotation is the argument of this sum
-        turn = float(np.angle(np.sum(bodies[1] * np.conj(bodies[0]))))
+        turn = float(turn_onto(bodies[0], bodies[1]))
     else:
         step = np.where(frames, then[:, 0] - now[:, 0], 0.0)
-        turn = float(np.angle(np.sum(step[cycle:] * np.conj(step[:-cycle])))) if len(step) > cycle else 0.0
+        turn = float(turn_onto(step[:-cycle], step[cycle:])) if len(step) > cycle else 0.0
     return advance, turn

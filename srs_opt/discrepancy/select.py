@@ -10,7 +10,7 @@ import numpy as np
 from srs_opt.calibrate.fit import Fit
 from srs_opt.calibrate.normal_equations import bounded_solve
 from srs_opt.calibrate.objective import priors
-from srs_opt.discrepancy.hypothesis import Hypothesis
+from srs_opt.discrepancy.hypothesis import Hypothesis, cost
 from srs_opt.discrepancy.search_settings import SEARCH
 from srs_opt.discrepancy.split import Split
 
@@ -44,16 +44,13 @@ def select(best: Hypothesis, fitted: Sequence[Hypothesis], split: Split) -> Sele
     under another name, without leaving physics or the bench behind, and holds no effect beyond those of a
     smaller rival. Where the best leaves a misfit, differences are judged as if that were noise too.
     """
-    own, reach = best.deviance + 2 * best.parameters, SEARCH.rival_deviance * best.fit.variance_inflation
+    own, reach = cost(best), SEARCH.rival_deviance * best.fit.variance_inflation
     near = [
         h
         for h in fitted
-        if h.names != best.names
-        and h.candidates
-        and h.deviance + 2 * h.parameters < own + reach
-        and not h.implausible()
+        if h.names != best.names and h.candidates and cost(h) < own + reach and not h.implausible()
     ]
-    near.sort(key=lambda h: h.deviance + 2 * h.parameters)
+    near.sort(key=cost)
     rivals: list[Hypothesis] = []
     for h in near:
         names = set(h.names)
@@ -69,7 +66,7 @@ def best_rival(best: Hypothesis, fitted: Sequence[Hypothesis]) -> Hypothesis | N
     names = set(best.names)
     others = [h for h in fitted if h.candidates and not (names <= set(h.names) or set(h.names) <= names)]
     others = [h for h in others if not h.implausible_size()] or others
-    return min(others, key=lambda h: h.deviance + 2 * h.parameters, default=None)
+    return min(others, key=cost, default=None)
 
 
 def _predictive(hypotheses: Sequence[Hypothesis], split: Split) -> dict[str, tuple[float, float]]:

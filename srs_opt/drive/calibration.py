@@ -16,6 +16,7 @@ from srs_opt.document import read_yaml
 from srs_opt.errors import InputError
 from srs_opt.files import write_json
 from srs_opt.geometry import rotate
+from srs_opt.measurement.weighted_mean import weighted_mean
 
 
 @dataclass(frozen=True)
@@ -93,16 +94,10 @@ def fit_factor(simulated: np.ndarray, measured: np.ndarray, sd: np.ndarray) -> F
         return Factor()
     ratio = np.log(measured[good] / simulated[good])
     # a stated deviation of zero would outweigh all others: 0.01 % at least
-    variance = np.maximum(np.nan_to_num(sd[good]) / measured[good], 1e-4) ** 2
-    weight = 1 / variance
-    mean = weight @ ratio / weight.sum()
-    # DerSimonian and Laird: Cochran's Q less its expectation, over what unit scatter adds to it
-    excess = weight @ (ratio - mean) ** 2 - (ratio.size - 1)
-    scale = weight.sum() - (weight**2).sum() / weight.sum()
-    scatter2 = max(excess / scale, 0.0) if ratio.size > 1 else 0.0
-    weight = 1 / (variance + scatter2)
-    value = math.exp(weight @ ratio / weight.sum())
-    return Factor(value, value / math.sqrt(weight.sum()), math.sqrt(scatter2), int(good.sum()))
+    relative_sd = np.maximum(np.nan_to_num(sd[good]) / measured[good], 1e-4)
+    mean = weighted_mean(ratio, relative_sd)
+    value = math.exp(mean.value)
+    return Factor(value, value * mean.sd, mean.scatter, mean.tests)
 
 
 def fit_calibration(

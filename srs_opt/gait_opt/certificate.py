@@ -308,7 +308,7 @@ def self_clearance_m(robot: Robot, orbit: Orbit, model: str | None = None) -> fl
     run = integrator(robot, model)
     _, _, x, y = body_over_cycle(run, orbit.time_s, orbit.pose, orbit.kappa)
     along = distance_along(np.stack([x[:, 0], y[:, 0]], axis=1))
-    apart = np.abs(along[:, None] - along[None]) > 1.6 * robot.body_width_m  # half a turn of its own width
+    apart = np.abs(along[:, None] - along[None]) > CERTIFICATE.apart_widths * robot.body_width_m
     if not apart.any():
         return float("inf")
     # every pair once

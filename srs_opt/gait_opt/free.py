@@ -124,7 +124,7 @@ def search_free(
             f"valves relaxed to [-1, 1]: {relaxation.speed_m_s:.4f} m/s with friction smoothed at "
             f"{FREE_VALVES.friction_speed_m_s:g} m/s, {at_limits:.0f} % of the levels at their limits"
         )
-        gait, counts = rounded(relaxation, problem)
+        gait, counts = on_off_near(relaxation, problem)
         own.append(gait)
     if problem.intervals > 1:
         own.append(_wave_with_notches(problem, wave.gait))
@@ -237,7 +237,7 @@ def relax(problem: CycleProblem, gait: Gait) -> Relaxation:
     )
 
 
-def rounded(relaxation: Relaxation, problem: CycleProblem) -> tuple[Gait, tuple[int, ...]]:
+def on_off_near(relaxation: Relaxation, problem: CycleProblem) -> tuple[Gait, tuple[int, ...]]:
     """Return an on/off gait near the relaxed one, and how many intervals rounding gave each segment.
 
     Sum-up rounding keeps the integral of the valve within one step; pulses shorter than the dwell time, and

@@ -216,5 +216,10 @@ def air_work_j(intervals: int, pressure_kpa: Any, volume_m3: Any) -> Any:
     `intervals` counts on-intervals of all segments; each begins with a fill on the left and ends with one
     on the right. Numbers or expressions, like pressure and volume.
     """
-    # two fills per on-interval, 1e3 Pa per kPa
-    return 2e3 * intervals * volume_m3 * pressure_kpa
+    return fill_work_j(2 * intervals, pressure_kpa, volume_m3)
+
+
+def fill_work_j(fills: int, pressure_kpa: Any, volume_m3: Any) -> Any:
+    """Return the energy of the air in chambers that are filled, J: volume x pressure each."""
+    # 1e3 Pa per kPa
+    return 1e3 * fills * volume_m3 * pressure_kpa

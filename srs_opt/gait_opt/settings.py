@@ -263,6 +263,9 @@ class CertificateSettings:
     limit_excess, constraint_excess : float
         Of a limit (band, curvature), and of an objective's own constraint: by which it may be exceeded
         after switches are rounded to ticks, which moves them by half a tick.
+    apart_widths : float
+        Body widths along the body from which on two parts may touch: half a turn of the body's own width.
+        Smaller: neighbours count as touching; larger: a tighter curl goes unseen.
     """
 
     cycles: int = 50
@@ -272,6 +275,7 @@ class CertificateSettings:
     standing_start: float = 0.01
     limit_excess: float = 0.01
     constraint_excess: float = 0.01
+    apart_widths: float = 1.6
 
 
 GOAL = GoalSettings()

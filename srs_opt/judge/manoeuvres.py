@@ -15,7 +15,7 @@ from srs_opt.errors import InputError
 from srs_opt.gait import Gait, check_gait
 from srs_opt.geometry import distance_along, rotate
 from srs_opt.judge.bodies import body_of, pull_of
-from srs_opt.judge.replay import Drift, Phases, play_blind, whole_step_s
+from srs_opt.judge.replay import Drift, play_blind, whole_step_s
 from srs_opt.judge.settings import ENGINE, REPLAY, EngineSettings
 from srs_opt.orbit.body import integrator
 from srs_opt.robot import Robot
@@ -97,8 +97,7 @@ def replay_manoeuvre(
     path = run.integrate(whole, run.rest())
     step_s = whole_step_s(whole.end_s, settings)
     snake = Snake(body_of(robot), step_s=step_s, pairs=settings.pairs, pull=pull_of(robot, room=False))
-    phases = Phases(whole.duration_s, whole.valve, whole.pressure_kpa, whole.frequency_hz)
-    seen, centre = play_blind(robot, snake, phases)
+    seen, centre = play_blind(robot, snake, whole)
     heading = seen.theta_rad.mean(axis=1)
     began = seen.time_s >= lead_s - 1e-9 if before is not None else np.ones(len(centre), dtype=bool)
     first = int(np.flatnonzero(began)[0])

@@ -22,19 +22,10 @@ from srs_opt.judge.bodies import body_of, drive_of, pull_of, slope_of
 from srs_opt.judge.settings import AGREEMENT, ENGINE, REPLAY, EngineSettings
 from srs_opt.judge.walls import boxes_of, clearances, solid_region
 from srs_opt.robot import Robot
+from srs_opt.simulate.timeline import Timeline
 
 Array = NDArray[np.float64]
 VERSION = 2  # of motion.json
-
-
-@dataclass(frozen=True)
-class Phases:
-    """Held valves, one after the other: durations (n,), valves (N-1, n), pressures and frequencies (n,)."""
-
-    duration_s: Array
-    valve: Array
-    pressure_kpa: Array
-    frequency_hz: Array
 
 
 @dataclass(frozen=True)
@@ -204,21 +195,21 @@ def whole_step_s(duration_s: float, settings: EngineSettings) -> float:
     return duration_s / math.ceil(duration_s / settings.step_s - 1e-9)
 
 
-def play_blind(robot: Robot, snake: Snake, phases: Phases) -> tuple[Motion, Array]:
+def play_blind(robot: Robot, snake: Snake, timeline: Timeline) -> tuple[Motion, Array]:
     """Play held valves from rest; return the engine's motion and its centre of mass (n, 2)."""
-    drive = drive_of(robot, phases.valve, phases.pressure_kpa, phases.frequency_hz)
-    steps = round(float(phases.duration_s.sum()) / snake.step_s)
+    drive = drive_of(robot, timeline.valve, timeline.pressure_kpa, timeline.frequency_hz)
+    steps = round(timeline.end_s / snake.step_s)
     times = np.asarray(np.arange(1, steps + 1) * snake.step_s, dtype=np.float64)
     tau = (robot.tau1_s, robot.tau2_s)
-    curvature, rate, _ = respond(Lags.rest(robot.segments), phases.duration_s, drive, tau, times)
+    curvature, rate, _ = respond(Lags.rest(robot.segments), timeline.duration_s, drive, tau, times)
     seen = snake.play(curvature, rate, REPLAY.steps_per_row)
     masses = np.array([link.mass_kg for link in snake.body.links])
     return seen, np.stack([seen.x_m @ masses, seen.y_m @ masses], axis=1) / masses.sum()
 
 
-def phases_of(motion: Mapping[str, Any], run: Mapping[str, Any]) -> Phases:
+def phases_of(motion: Mapping[str, Any], run: Mapping[str, Any]) -> Timeline:
     """Return what the valves do in a run: cycles until the next thing begins, halts, nothing in between."""
-    things: list[tuple[float, Phases]] = []
+    things: list[tuple[float, Timeline]] = []
     for gait, start_s, joining in run["cycles"]:
         entry = motion["gaits"][gait] if joining is None else motion["joining"][joining]
         things.append((float(start_s), _cycle(entry)))
@@ -226,19 +217,14 @@ def phases_of(motion: Mapping[str, Any], run: Mapping[str, Any]) -> Phases:
         duration = np.array(halt["duration_s"], dtype=float)
         valve = np.array(halt["valve"], dtype=float)
         pressure = np.array(halt["pressure_kpa"], dtype=float)
-        things.append((float(halt["start_s"]), Phases(duration, valve, pressure, np.ones(duration.size))))
+        things.append((float(halt["start_s"]), Timeline(duration, valve, pressure, np.ones(duration.size))))
     things.sort(key=lambda thing: thing[0])
     ends = [*(start for start, _ in things[1:]), float(run["duration_s"])]
-    parts = [_until(phases, end - start) for (start, phases), end in zip(things, ends)]
-    return Phases(
-        np.concatenate([p.duration_s for p in parts]),
-        np.concatenate([p.valve for p in parts], axis=1),
-        np.concatenate([p.pressure_kpa for p in parts]),
-        np.concatenate([p.frequency_hz for p in parts]),
-    )
+    parts = [_until(played, end - start) for (start, played), end in zip(things, ends)]
+    return Timeline.join(parts)
 
 
-def _cycle(entry: Mapping[str, Any]) -> Phases:
+def _cycle(entry: Mapping[str, Any]) -> Timeline:
     """Return the phases of one cycle, a change of pressure in stairs at its means."""
     gait = Gait.of_record(dict(entry))
     durations, _ = gait.phases()
@@ -253,20 +239,17 @@ def _cycle(entry: Mapping[str, Any]) -> Phases:
     pressure = np.full(middles.size, gait.pressure_kpa)
     if ramp_s > 0:
         pressure = np.interp(middles, [0.0, ramp_s], [float(entry["from_kpa"]), gait.pressure_kpa])
-    return Phases(np.diff(edges), valve, pressure, np.full(middles.size, gait.frequency_hz))
+    return Timeline(np.diff(edges), valve, pressure, np.full(middles.size, gait.frequency_hz))
 
 
-def _until(phases: Phases, end_s: float) -> Phases:
-    """Return phases cut off at an end, or vented until then."""
-    ends = np.cumsum(phases.duration_s)
-    keep = ends - phases.duration_s < end_s - 1e-9
-    duration = np.minimum(ends, end_s)[keep] - (ends - phases.duration_s)[keep]
-    valve, pressure, frequency = phases.valve[:, keep], phases.pressure_kpa[keep], phases.frequency_hz[keep]
-    if end_s > ends[-1] + 1e-9:
-        duration = np.append(duration, end_s - ends[-1])
-        valve = np.concatenate([valve, np.zeros((valve.shape[0], 1))], axis=1)
-        pressure, frequency = np.append(pressure, pressure[-1]), np.append(frequency, frequency[-1])
-    return Phases(duration, valve, pressure, frequency)
+def _until(timeline: Timeline, end_s: float) -> Timeline:
+    """Return a timeline cut off at an end, or vented until then."""
+    cut = timeline.until(end_s)
+    left_s = end_s - cut.end_s
+    if left_s <= 1e-9:
+        return cut
+    pressure, frequency = float(timeline.pressure_kpa[-1]), float(timeline.frequency_hz[-1])
+    return Timeline.join([cut, Timeline.vent(len(timeline.valve), left_s, pressure, frequency)])
 
 
 def _in_goal(goal: Mapping[str, Any], centre: Array) -> NDArray[np.bool_]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from srs_opt.controller.program import ControllerLimits, Program, ProgramGait, events_of
 from srs_opt.figures import COLOURS, LEFT, PAGE_IN, RIGHT, draw_body, new_figure, save_figure, styled
-from srs_opt.gait_opt.goal import chamber_volume_m3
+from srs_opt.gait_opt.goal import chamber_volume_m3, fill_work_j
 from srs_opt.gait_opt.ticks import Schedule
 from srs_opt.geometry import points_in_room
 from srs_opt.manoeuvre.search import Manoeuvre
@@ -35,8 +35,7 @@ def record_of(run: Integrator, task: Task, found: Manoeuvre) -> dict[str, Any]:
         "end": {"x_m": x, "y_m": y, "heading_rad": heading, "speed_m_s": float(np.hypot(u, v))},
         "switches": plan.switch_records(),
         "fills": plan.fills,
-        # volume times pressure per fill, Pa from kPa
-        "air_j": plan.fills * chamber_volume_m3(run.robot) * plan.pressure_kpa * 1e3,
+        "air_j": fill_work_j(plan.fills, plan.pressure_kpa, chamber_volume_m3(run.robot)),
         "space_m": 2 * disc_radius_m(points, run.robot.body_width_m / 2),
         "certificate": found.certificate.record(),
         "exact_s": found.exact_s,

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from srs_opt.geometry import points_in_room, rotate
+from srs_opt.geometry import points_in_room, quarter_turn, rotate
 from srs_opt.manoeuvre.settings import CONSTRAINT, END
 from srs_opt.manoeuvre.shooting import Shot
 from srs_opt.manoeuvre.task import Task
@@ -203,8 +203,7 @@ def body_points(
     jacobian = np.repeat(moved[:, None, :2], line.shape[1], axis=1)
     # d(point) = d(place) + d(heading) e_z x arm + R(heading) d(line)/d(kappa) d(kappa)
     arm = points - states[:, None, PLACE]
-    turned = np.stack([-arm[..., 1], arm[..., 0]], axis=-1)
-    jacobian = jacobian + turned[..., None] * moved[:, None, None, 2]
+    jacobian = jacobian + quarter_turn(arm)[..., None] * moved[:, None, None, 2]
     for k in range(kappa.shape[1]):
         step = np.zeros(kappa.shape[1])
         step[k] = CONSTRAINT.curvature_step_1_m

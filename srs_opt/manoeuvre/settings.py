@@ -115,6 +115,23 @@ class ManoeuvreSolverSettings:
     step_s : float
         Of the integration. Out of rest derivatives err by 20 % with 2.5 ms, by 1 % with 1 ms; coarser ones
         cost 0.5 to 2 % of the merit.
+    fill_s_kpa : float
+        Price of a fill where air is the objective, seconds per kPa: 0.02 s at 50 kPa, so that a manoeuvre's
+        air counts about as much as its time would. Smaller: `gain_s` ends the search earlier; larger: the
+        penalty on violations counts for less beside it.
+    many_rows, worst_times : int, float
+        From so many constraints on, many of which tell of one overlap, the worst violation so many times
+        over stands for their sum. Smaller and larger: a body in a wall counts less or more beside the time.
+    kept, kept_per_s, kept_reach_s : float
+        Rows of a linear program: those with less to spare than `kept` body lengths and `kept_per_s` of them
+        per second of reach, or of `kept_reach_s`. Smaller: steps that overrun a row left out; larger: larger
+        programs.
+    least_duration_s : float
+        That a linear step leaves of a manoeuvre. Smaller: a misled step may take away the whole of it;
+        larger: very short ones cannot be found.
+    duration_reaches, radius_per_s : float
+        Trust region of the duration, in reaches, and of the disc's radius, body lengths per second of reach.
+        Smaller: more steps; larger: the motion at the end, and so the model of it, is another.
     """
 
     penalty_s: float = 4.720000000000001
@@ -129,6 +146,15 @@ class ManoeuvreSolverSettings:
     gain_s: float = 2e-4
     most_idle: int = 4
     step_s: float = 0.00125
+    fill_s_kpa: float = 4e-4
+    many_rows: int = 60
+    worst_times: float = 3.0
+    kept: float = 0.21186440677966104
+    kept_per_s: float = 6.3559322033898304
+    kept_reach_s: float = 0.01
+    least_duration_s: float = 0.05
+    duration_reaches: float = 4.0
+    radius_per_s: float = 21.186440677966104
 
 
 @dataclass(frozen=True)

@@ -58,7 +58,9 @@ class Solver:
         missed = np.minimum(values, 0.0)
         # many rows tell of one overlap: the worst counts, and a little of the others
         price = self._price(shot.plan, radius)
-        merit = price - self.penalty_s_m * (missed.sum() if values.size < 60 else missed.min() * 3)
+        many = values.size >= MANOEUVRE_SOLVER.many_rows
+        violation = MANOEUVRE_SOLVER.worst_times * missed.min() if many else missed.sum()
+        merit = price - self.penalty_s_m * violation
         return Candidate(shot.plan, price, float(merit), float(-missed.min(initial=0.0)))
 
     def _radius(self, shot: Shot) -> float:
@@ -72,9 +74,8 @@ class Solver:
         if self.task.objective == "space":
             return self.space_s_m * radius_m + MANOEUVRE_SOLVER.time_beside * plan.duration_s
         if self.task.objective == "air":
-            return (
-                0.02 * plan.fills * plan.pressure_kpa / 50.0 + MANOEUVRE_SOLVER.time_beside * plan.duration_s
-            )
+            air = MANOEUVRE_SOLVER.fill_s_kpa * plan.fills * plan.pressure_kpa
+            return air + MANOEUVRE_SOLVER.time_beside * plan.duration_s
         return plan.duration_s
 
     def plays(self, plan: ValvePlan) -> bool:
@@ -136,14 +137,15 @@ class Solver:
         radius = self._radius(shot)
         rows = self.rows(shot, radius)
         # rows with more to spare than a step can use up only make the linear program larger
-        keep = rows.values < 1.5 * max(reach, 0.01) + 0.05
+        used = MANOEUVRE_SOLVER.kept_per_s * max(reach, MANOEUVRE_SOLVER.kept_reach_s)
+        keep = rows.values < (used + MANOEUVRE_SOLVER.kept) * self.run.robot.length_m
         rows = Rows(rows.values[keep], None if rows.jacobian is None else rows.jacobian[keep])
         assert rows.jacobian is not None
         n, m = plan.switches, rows.values.size
         size = n + 2 + 1 + m  # times, duration, pressure; radius; violations
         cost = np.zeros(size)
         cost[n] = 1.0 if task.objective == "time" else MANOEUVRE_SOLVER.time_beside
-        cost[n + 1] = 0.02 * plan.fills / 50.0 if task.objective == "air" else 0.0
+        cost[n + 1] = MANOEUVRE_SOLVER.fill_s_kpa * plan.fills if task.objective == "air" else 0.0
         cost[n + 2] = self.space_s_m if task.objective == "space" else 0.0
         cost[n + 3 :] = self.penalty_s_m
         # values + J x + violation >= 0, written as A x <= b
@@ -152,17 +154,19 @@ class Solver:
         low, high = np.full(size, -np.inf), np.full(size, np.inf)
         # the trust region: linear models of sticking friction hold for milliseconds
         low[:n], high[:n] = -reach, reach
-        low[n], high[n] = -4 * reach, 4 * reach
+        high[n] = MANOEUVRE_SOLVER.duration_reaches * reach
+        low[n] = -high[n]
         if task.longest_s is not None:
             high[n] = min(high[n], max(task.longest_s - plan.duration_s, low[n]))
         # a linear step must not take the whole manoeuvre away
-        low[n] = max(low[n], 0.05 - plan.duration_s)
+        low[n] = max(low[n], MANOEUVRE_SOLVER.least_duration_s - plan.duration_s)
         span = MANOEUVRE_SOLVER.pressure_kpa_per_s * reach
         low[n + 1] = np.clip(bounds.pressure_kpa[0] - plan.pressure_kpa, -span, span)
         high[n + 1] = np.clip(bounds.pressure_kpa[1] - plan.pressure_kpa, -span, span)
         if not task.pressure_is_free:
             low[n + 1] = high[n + 1] = 0.0
-        low[n + 2], high[n + 2] = -5 * reach, 5 * reach
+        high[n + 2] = MANOEUVRE_SOLVER.radius_per_s * self.run.robot.length_m * reach
+        low[n + 2] = -high[n + 2]
         low[n + 3 :] = 0.0
         found = linprog(
             cost,

@@ -122,12 +122,6 @@ class ValvePlan:
             rows.append(ValveRow(row.states[first : last + 1], row.times_s[first:last]))
         return replace(self, rows=tuple(rows))
 
-    def on_ticks(self, tick_s: float) -> ValvePlan:
-        """Return the plan with every switch at the nearest tick and the end at the next one."""
-        end = math.ceil(self.duration_s / tick_s - 1e-6) * tick_s
-        times = np.round(self.times() / tick_s) * tick_s
-        return self.with_times(times, end, self.pressure_kpa).trimmed()
-
     def shortest_dwell_s(self, age_s: tuple[float, ...]) -> float:
         """Return the shortest time for which a valve is held between two switches.
 

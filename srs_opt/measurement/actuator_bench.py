@@ -9,18 +9,9 @@ import numpy as np
 
 from srs_opt.errors import InputError
 from srs_opt.measurement.fit_settings import STEP_TEST
-from srs_opt.measurement.records import CONDITIONS, Array
+from srs_opt.measurement.records import CONDITIONS
 from srs_opt.measurement.steps import StepFit, time_constants
-
-
-@dataclass(frozen=True)
-class Mean:
-    """A weighted mean over tests: value, its standard deviation, scatter between tests beyond error."""
-
-    value: float
-    sd: float
-    scatter: float
-    tests: int
+from srs_opt.measurement.weighted_mean import Mean, weighted_mean
 
 
 @dataclass(frozen=True)
@@ -106,22 +97,6 @@ def combine_steps(fits: Sequence[StepFit]) -> ActuatorBench:
             same = [f for f in group if f.pressure_kpa == pressure]
             constants.append(_constants(condition, pressure, same))
     return ActuatorBench(tuple(curvature), tuple(constants))
-
-
-def weighted_mean(values: Array, sds: Array) -> Mean:
-    """Return the mean of values that scatter by more than their own errors (DerSimonian and Laird, 1986)."""
-    precision = np.asarray(sds, dtype=float) ** -2.0
-    total = precision.sum()
-    centre = float((precision * values).sum() / total)
-    spare = len(values) - 1
-    excess = 0.0
-    if spare:
-        chi2 = float((precision * (values - centre) ** 2).sum())
-        # Cochran's Q less its expectation, over what unit scatter adds to it
-        excess = max(0.0, (chi2 - spare) / float(total - (precision**2).sum() / total))
-    weights = 1 / (np.asarray(sds) ** 2 + excess)
-    value = float((weights * values).sum() / weights.sum())
-    return Mean(value, float(weights.sum() ** -0.5), excess**0.5, len(values))
 
 
 def _curvature(condition: str, fits: list[StepFit]) -> CurvatureOverPressure:

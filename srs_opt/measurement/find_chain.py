@@ -45,7 +45,8 @@ def find_chain(chain: Chain, positions: Array) -> np.ndarray | None:
                 # of rows that are spaced alike the straighter one wins
                 turn = _turn(positions, path, int(j), corners)
                 if turn < LABELS.most_turn_rad:
-                    stack.append(((*path, int(j)), cost + misfit[last, path[-1], j] + 0.05 * turn))
+                    more = misfit[last, path[-1], j] + LABELS.turn_cost_1_rad * turn
+                    stack.append(((*path, int(j)), cost + more))
     return np.array(best[1]) if best[1] else None
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from srs_opt.errors import NoAnswerError
+from srs_opt.geometry import turn_onto
 from srs_opt.measurement.chain import Chain, chain_of, marker_positions
 from srs_opt.measurement.noise import noise_sd
 from srs_opt.measurement.records import Array
@@ -201,9 +202,7 @@ def _shape_gaps(chain: Chain, kappa: Array, z: NDArray[np.complex128]) -> Array:
     m = np.where(seen, model[..., 0] + 1j * model[..., 1], 0.0)
     z = np.where(seen, z - z.sum(axis=1, keepdims=True) / count, 0.0)
     m = np.where(seen, m - m.sum(axis=1, keepdims=True) / count, 0.0)
-    # in the complex plane the best rotation is the argument of this sum
-    turn = (np.conj(m) * z).sum(axis=1, keepdims=True)
-    gap = z - np.exp(1j * np.angle(turn)) * m
+    gap = z - np.exp(1j * turn_onto(m, z, axis=1))[:, None] * m
     return np.concatenate([gap.real.ravel(), gap.imag.ravel()])
 
 

@@ -150,6 +150,9 @@ class LabelSettings:
         That are looked at for the best chain, where there are many ghosts; more take longer.
     most_turn_rad : float
         At a marker: a segment does not bend by more than about a right angle.
+    turn_cost_1_rad : float
+        Of a row's turns, beside the relative misfits of its spacings. Smaller: of rows that are spaced alike
+        a crooked one may win; larger: a straight row of ghosts beats a bent robot.
     """
 
     near_pitch: float = 0.45
@@ -160,6 +163,7 @@ class LabelSettings:
     uneven_share: float = 0.15
     most_paths: int = 200_000
     most_turn_rad: float = 1.6
+    turn_cost_1_rad: float = 0.05
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait
 from srs_opt.model.parameters import Structure
 from srs_opt.model.registry import build
-from srs_opt.orbit.settings import DIFFERENCE
+from srs_opt.orbit.settings import DIFFERENCE, ORBIT
 from srs_opt.simulate.integrate import Integrator
 
 
@@ -38,7 +38,7 @@ def periodic_actuators(run: Integrator, gait: Gait, p: np.ndarray) -> np.ndarray
         return np.asarray(np.linalg.solve(np.eye(2) - decay, state)).ravel()
     fine = _fine(durations)
     act = np.zeros(n)
-    for _ in range(200):
+    for _ in range(ORBIT.most_periods):
         following = act
         for h, valve, k in zip(durations, valves.T, fine):
             for _ in range(k):
@@ -46,7 +46,9 @@ def periodic_actuators(run: Integrator, gait: Gait, p: np.ndarray) -> np.ndarray
         if np.abs(following - act).max() <= 1e-9 * (1 + np.abs(act).max()):
             return following
         act = following
-    raise NoAnswerError("the curvature does not settle into a cycle within 200 periods under this gait")
+    raise NoAnswerError(
+        f"the curvature does not settle into a cycle within {ORBIT.most_periods} periods under this gait"
+    )
 
 
 def actuator_multiplier(run: Integrator, gait: Gait, act: np.ndarray, p: np.ndarray) -> float:
@@ -78,8 +80,7 @@ def actuator_multiplier(run: Integrator, gait: Gait, act: np.ndarray, p: np.ndar
 
 def _fine(durations: np.ndarray) -> np.ndarray:
     """Return how many steps of the integration each phase takes where no closed form exists."""
-    # Runge-Kutta steps of at most 2.5 ms, a twentieth of the built-in robot's shorter time constant
-    steps: np.ndarray = np.maximum(np.ceil(durations / 0.0025).astype(int), 2)
+    steps: np.ndarray = np.maximum(np.ceil(durations / ORBIT.actuator_step_s).astype(int), 2)
     return steps
 
 

@@ -108,7 +108,11 @@ class OrbitSettings:
         Allowed besides: Newton's mesh is finer than that on which the motion settled, which moves the
         orbit.
     most_periods : int
-        From rest, before the motion counts as one that does not repeat.
+        From rest, before the motion (or the actuators alone) counts as one that does not repeat.
+    actuator_step_s : float
+        Runge-Kutta steps of actuators without a closed form at most: a twentieth of the built-in robot's
+        shorter time constant. Smaller: as many more steps in every search; larger: a curvature whose own
+        cycle is not the simulation's.
     """
 
     newton_steps: int = 30
@@ -128,6 +132,7 @@ class OrbitSettings:
     farthest_m_s: float = 0.15
     same_m_s: float = 2e-3
     most_periods: int = 200
+    actuator_step_s: float = 0.0025
 
 
 ATTRACTOR = AttractorSettings()

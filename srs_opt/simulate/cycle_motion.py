@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from srs_opt.geometry import centre_of_rotation
+from srs_opt.geometry import centre_of_rotation, quarter_turn, unit_vectors
 from srs_opt.simulate.settings import MOTION
 
 
@@ -76,12 +76,9 @@ def cycle_motion(
                 displacement, float(speed), float(turn / period), float(side * radius), _floats(envelope)
             )
     distance_m = float(np.hypot(dx, dy))
-    forward = 1.0 if dx * np.cos(heading) + dy * np.sin(heading) >= 0 else -1.0
-    along = (
-        np.array([dx, dy]) / distance_m * forward
-        if distance_m > 1e-9
-        else np.array([np.cos(heading), np.sin(heading)])
-    )
+    ahead = unit_vectors(np.asarray(heading))
+    forward = 1.0 if ahead @ displacement[:2] >= 0 else -1.0
+    along = np.array([dx, dy]) / distance_m * forward if distance_m > 1e-9 else ahead
     middle = weights @ pose[:, :2]
     lateral = along[0] * (outline_y - middle[1]) - along[1] * (outline_x - middle[0])
     envelope = (half_width + largest(-lateral), half_width + largest(lateral))
@@ -112,8 +109,8 @@ def _forward(
     middle = weights @ pose[:, :2]
     arm = middle - centre
     # the velocity of a rotation, e_z x arm times its sense
-    travel = np.sign(displacement[2]) * np.array([-arm[1], arm[0]])
-    return 1.0 if travel @ np.array([np.cos(heading), np.sin(heading)]) >= 0 else -1.0
+    travel = np.sign(displacement[2]) * quarter_turn(arm)
+    return 1.0 if travel @ unit_vectors(np.asarray(heading)) >= 0 else -1.0
 
 
 def _floats(pair: tuple[float, float]) -> tuple[float, float]:

@@ -12,6 +12,7 @@ from srs_opt.calibrate.fit import fit
 from srs_opt.calibrate.fit_settings import FIT, OBJECTIVE
 from srs_opt.calibrate.normal_equations import trial_normal_equations
 from srs_opt.calibrate.objective import best_move, geodesic_move, objective, within_reach
+from srs_opt.calibrate.result import unidentifiable
 from srs_opt.calibrate.whiten import Whitening
 
 TRUTH = np.array([0.4, 1.2])
@@ -134,3 +135,12 @@ def test_a_fit_that_comes_from_far_is_not_given_up_while_it_gains():
     assert found.deviance == best.deviance
     without_hope = fit(measured, COORDINATES, start, iterations=100, beat=best.deviance - 1e6)
     assert without_hope.iterations < 5
+
+
+def test_a_direction_that_many_values_share_alike_is_named():
+    """Twelve values of which the data tell all but a common factor: each has a part of 1/sqrt(12) = 0.29."""
+    coordinates = [Coordinate(f"value{k}", prior_sd=0.1) for k in range(12)]
+    shared = np.full((12, 12), 1 / 12)  # the projection on the common direction
+    covariance = 0.01 * (0.01 * (np.eye(12) - shared) + shared)
+    (found,) = unidentifiable(coordinates, covariance)
+    assert set(found.split(" * ")) == {c.name for c in coordinates}

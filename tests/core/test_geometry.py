@@ -13,6 +13,7 @@ from srs_opt.geometry import (
     rotate,
     rotate_back,
     rotation_matrix,
+    turn_onto,
     turning_angles,
     unit_vectors,
     wrapped,
@@ -76,3 +77,16 @@ def test_a_quarter_turn_is_the_derivative_of_a_unit_vector():
     angle, step = np.linspace(-4, 4, 9), 1e-6
     change = (unit_vectors(angle + step) - unit_vectors(angle - step)) / (2 * step)
     assert quarter_turn(unit_vectors(angle)) == pytest.approx(change, abs=1e-9)
+
+
+def test_the_best_rotation_of_points_onto_others_is_found():
+    rng = np.random.default_rng(5)
+    points, noise = rng.standard_normal((2, 3, 8, 2)) @ np.array([1, 1j])
+    angles = np.array([0.4, -2.9, 3.0])
+    onto = points * np.exp(1j * angles)[:, None]
+    np.testing.assert_allclose(turn_onto(points, onto, axis=1), angles, atol=1e-12)
+    # least squares by trying every angle
+    tried, noisy = np.linspace(-np.pi, np.pi, 6001), onto[0] + 0.3 * noise[0]
+    missed = [np.abs(noisy - np.exp(1j * a) * points[0]) ** 2 for a in tried]
+    best = tried[np.argmin(np.sum(missed, axis=1))]
+    assert float(turn_onto(points[0], noisy)) == pytest.approx(best, abs=1.1e-3)
