@@ -17,16 +17,23 @@ from dataclasses import dataclass, replace
 from multiprocessing import get_context
 from pathlib import Path
 
+import numpy as np
+
 from planners.plan.answer import Plan, PlanResult
 from planners.plan.certify import certify
 from planners.plan.registry import OMPLS, OURS, Effort, Planner, planner_named
 from planners.plan.solve import BEAM, TOO_NARROW, LatticeSolver
+from planners.search.costmap import BLOCKED_S
 from planners.search.ompl_setup import MISSING, has_ompl
 from planners.search.problem import Problem
 from srs_opt import plugins
 from srs_opt.interrupts import signals_deferred, workers_deaf_to_interrupts
 
-FIRST_NODES = 3000  # cycles that our searches look at in the first round; doubled every round
+# Cycles that our searches look at in the first round, at least and per second of way; doubled every round.
+# One beam along a way of 150 s takes 3000, and the certificate may send it back a few times: with too few,
+# OMPL's planners are asked while a plan is being mended.
+FIRST_NODES, NODES_PER_S = 3000, 60.0
+LOOK_NODES = 600  # of the search over runs where the first beam has failed: corridors take it 10 to 650
 FIRST_ITERATIONS = 1000  # of another planner
 ROUNDS = 5
 WIDER = (50, 150, 500, 1500)  # beams that look for better plans
@@ -79,12 +86,22 @@ def solve(problem: Problem, request: PlanRequest, tell: Tell = lambda message: N
 
 def _rounds(problem: Problem, request: PlanRequest, tell: Tell) -> PlanResult:
     makers = [planner_named(name).solver for name in OURS]
-    ours = [make(problem, time_limit_s=request.time_limit_s, tell=tell) for make in makers if make]
+    options = {"time_limit_s": request.time_limit_s, "tell": tell}
+    lattice, runs, *others = [make(problem, **options) for make in makers if make]
+    ours = [lattice, runs, *others]
+    lattice.hand_over = True
     began = time.perf_counter()
+    start = np.array([problem.start.x, problem.start.y])
+    way_s = float(problem.to_goal.at(start))
+    first = FIRST_NODES if way_s > BLOCKED_S / 2 else max(FIRST_NODES, round(NODES_PER_S * way_s))
+    for solver, nodes in ((lattice, first), (runs, LOOK_NODES)):
+        result = solver.run(nodes)
+        if result.plan is not None or result.status == "infeasible":
+            return result
     for turn in range(ROUNDS):
         narrow = None
         for solver in ours:
-            result = solver.run(FIRST_NODES * 2**turn)
+            result = solver.run(first * 2**turn)
             if result.plan is not None or result.status == "infeasible":
                 return result
             narrow = result if result.reason == TOO_NARROW else narrow

@@ -56,6 +56,9 @@ class LatticeSolver:
         Another guard: says when to stop.
     tell : callable
         Gets messages about the progress.
+    hand_over : bool
+        Answer once when the first beam has failed, so that another search may look before the finer beam and
+        the best-first search, which take long where there is little room.
     """
 
     name = "lattice"
@@ -70,8 +73,10 @@ class LatticeSolver:
         time_limit_s: float = 30.0,
         stop: Callable[[], bool] = lambda: False,
         tell: Callable[[str], None] = lambda message: None,
+        hand_over: bool = False,
     ) -> None:
         self.problem, self.stop, self.tell = problem, stop, tell
+        self.hand_over = hand_over
         self.settings, self.beams = settings or LatticeSettings(), beams
         if problem.goal.heading is not None:  # a map of places alone would lead past it
             self.settings = replace(self.settings, by_heading=True)
@@ -101,11 +106,15 @@ class LatticeSolver:
             if isinstance(outcome, PlanResult):
                 return outcome
             if outcome is None:
+                beams = len(self.beams)
                 if not self._retreat():
                     self.ended = True
                     if self.whole_way and no_body_fits(self.problem):
                         return self._answer("infeasible", TOO_NARROW)
                     return self._answer("not_found", self._exhausted())
+                if self.hand_over and len(self.beams) < beams:
+                    self.hand_over = False
+                    return self._answer("not_found", "no plan in the first beam")
                 continue
             gaits = self.kept + outcome
             certificate = self.certifier.certify(gaits)
