@@ -51,7 +51,7 @@ def test_names(name):
 
 @pytest.mark.parametrize("name", ["magic", "sst", "rs-", "dubins-est", "auto", "rs-aorrtc", "-rrt"])
 def test_no_such_planner(name):
-    with pytest.raises(InputError, match=r"expected auto .*, lattice, fine.*rrt.*bitstar"):
+    with pytest.raises(InputError, match=r"expected auto .*, lattice, runs, fine.*rrt.*bitstar"):
         planner_named(name)
 
 
