@@ -58,8 +58,8 @@ def add_planning_options(parser: Parser) -> None:
         type=str.lower,
         default="auto",
         metavar="NAME",
-        help="auto (default, a portfolio), lattice, runs, fine, one of OMPL's (rrt, est, kpiece1; dubins-NAME "
-        "and rs-NAME for a route of its geometric planners), or one that a --plugin registers",
+        help="auto (default, a portfolio), lattice, runs, fine, one of OMPL's (rrt, est, kpiece1; "
+        "dubins-NAME and rs-NAME for a route of its geometric planners), or one that a --plugin registers",
     )
     parser.add_argument(
         "--best", action="store_true", help="go on looking for better plans until the time limit"
