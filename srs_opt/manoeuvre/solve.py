@@ -3,7 +3,8 @@
 The motion depends on its switch times smoothly but, near sticking friction, with strong curvature; its
 memory is short (velocities and bends decay within a cycle) and only the pose adds up. So single shooting
 from the start is well conditioned, the linear model is right within some milliseconds, and optima lie in
-corners: where dwell, end and room bind. Violations are penalized exactly (L1).
+corners: where dwell, end and room bind. Violations are penalized exactly, by their sum, or by the worst where
+many rows tell of one overlap; the linear program minimizes the merit by which steps are judged.
 """
 
 from __future__ import annotations
@@ -56,12 +57,13 @@ class Solver:
         if not np.isfinite(values).all():
             return Candidate(shot.plan, np.inf, np.inf, np.inf)
         missed = np.minimum(values, 0.0)
-        # many rows tell of one overlap: the worst counts, and a little of the others
         price = self._price(shot.plan, radius)
-        many = values.size >= MANOEUVRE_SOLVER.many_rows
-        violation = MANOEUVRE_SOLVER.worst_times * missed.min() if many else missed.sum()
-        merit = price - self.penalty_s_m * violation
+        violation = missed.min() if _is_shared(values) else missed.sum()
+        merit = price - self._penalty_s_m(values) * violation
         return Candidate(shot.plan, price, float(merit), float(-missed.min(initial=0.0)))
+
+    def _penalty_s_m(self, values: np.ndarray) -> float:
+        return self.penalty_s_m * (MANOEUVRE_SOLVER.worst_times if _is_shared(values) else 1.0)
 
     def _radius(self, shot: Shot) -> float:
         if self.task.objective != "space":
@@ -138,18 +140,20 @@ class Solver:
         rows = self.rows(shot, radius)
         # rows with more to spare than a step can use up only make the linear program larger
         used = MANOEUVRE_SOLVER.kept_per_s * max(reach, MANOEUVRE_SOLVER.kept_reach_s)
+        penalty, shared = self._penalty_s_m(rows.values), _is_shared(rows.values)
         keep = rows.values < (used + MANOEUVRE_SOLVER.kept) * self.run.robot.length_m
         rows = Rows(rows.values[keep], None if rows.jacobian is None else rows.jacobian[keep])
         assert rows.jacobian is not None
         n, m = plan.switches, rows.values.size
-        size = n + 2 + 1 + m  # times, duration, pressure; radius; violations
+        slack = np.ones((m, 1)) if shared else sparse.identity(m)
+        size = n + 2 + 1 + slack.shape[1]  # times, duration, pressure; radius; violations
         cost = np.zeros(size)
         cost[n] = 1.0 if task.objective == "time" else MANOEUVRE_SOLVER.time_beside
         cost[n + 1] = MANOEUVRE_SOLVER.fill_s_kpa * plan.fills if task.objective == "air" else 0.0
         cost[n + 2] = self.space_s_m if task.objective == "space" else 0.0
-        cost[n + 3 :] = self.penalty_s_m
+        cost[n + 3 :] = penalty
         # values + J x + violation >= 0, written as A x <= b
-        near = sparse.hstack([sparse.csr_matrix(-rows.jacobian), -sparse.identity(m)])
+        near = sparse.hstack([sparse.csr_matrix(-rows.jacobian), -slack])
         dwell, room = self._dwell_rows(plan, size)
         low, high = np.full(size, -np.inf), np.full(size, np.inf)
         # the trust region: linear models of sticking friction hold for milliseconds
@@ -205,6 +209,11 @@ class Solver:
         if orbit is None:
             return (0.0,) * self.run.structure.segments
         return standing_s(orbit.gait, self.task.bounds.dwell_s)
+
+
+def _is_shared(values: np.ndarray) -> bool:
+    """Whether one violation, the worst, stands for all: many rows tell of one overlap."""
+    return values.size >= MANOEUVRE_SOLVER.many_rows
 
 
 def _split(x: np.ndarray) -> tuple[np.ndarray, float, float]:
