@@ -23,7 +23,7 @@ GOAL = "#2e8b57"
 RIM = 0.012
 """Width of the drawn rim of wall about the bounds, over the maze's larger side."""
 ARROW_M = 0.05
-MAX_PIXELS = 2000
+MAX_PIXELS = 1500
 """Occupancy grids are thinned to this many cells a side for drawing (occupied if any is)."""
 
 
@@ -89,7 +89,7 @@ def _draw_raster(axes: Axes, maze: Maze) -> None:
 
 
 def _draw_cells(axes: Axes, raster: Raster, cells: NDArray[np.bool_], color: str) -> None:
-    from matplotlib.colors import ListedColormap
+    from matplotlib.colors import to_rgba_array
     from matplotlib.transforms import Affine2D
 
     thin = max(1, math.ceil(max(cells.shape) / MAX_PIXELS))
@@ -99,12 +99,14 @@ def _draw_cells(axes: Axes, raster: Raster, cells: NDArray[np.bool_], color: str
     cells = np.asarray(pools.any(axis=(1, 3)))
     step = raster.cell_m * thin
     turned = Affine2D().rotate(raster.origin.heading).translate(raster.origin.x, raster.origin.y)
+    # bytes of colour: numbers with a colour map take 300 MB more for 2000 x 2000 cells
+    image = np.zeros((*cells.shape, 4), dtype=np.uint8)
+    image[cells] = np.round(255 * to_rgba_array(color)[0])
     axes.imshow(
-        np.ma.masked_equal(cells, False),
+        image,
         origin="lower",
         extent=(0.0, cells.shape[1] * step, 0.0, cells.shape[0] * step),
         transform=turned + axes.transData,
-        cmap=ListedColormap([color]),
         interpolation="nearest",
         zorder=2,
         aspect="equal",

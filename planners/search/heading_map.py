@@ -163,7 +163,9 @@ def heading_map(
         clear[clear] = field.clearance(middle[clear]) > reach_m
         begin, end = begin[clear], end[clear]
         mean = 0.5 * (cost[begin] + cost[end])
-        edges.append(((begin * COURSES + k) * 2 + d, (end.astype(np.int64) * COURSES + to) * 2 + d, mean))
+        # there are fewer states than 2^31, and half the memory of millions of edges counts
+        first, last = (begin * COURSES + k) * 2 + d, (end.astype(np.int64) * COURSES + to) * 2 + d
+        edges.append((first.astype(np.int32), last.astype(np.int32), mean))
 
     for d, sign in ((0, 1), (1, -1)):
         if not straight[d]:
@@ -184,11 +186,13 @@ def heading_map(
                     add(offset.astype(np.int64), cost, k, (k + side) % COURSES, d)
     count = len(place) * COURSES * 2
     if min(straight) > 0:
-        forward = 2 * np.arange(count // 2)
+        forward = 2 * np.arange(count // 2, dtype=np.int32)
         cost = np.full(forward.size, reversal_s)
         edges += [(forward, forward + 1, cost), (forward + 1, forward, cost)]
     begins, ends, costs = (np.concatenate(part) for part in zip(*edges))
+    edges.clear()
     graph = coo_matrix((costs, (ends, begins)), shape=(count, count)).tocsr()  # backwards, from the goal
+    del begins, ends, costs
     sources = _sources(goal, nodes[free])
     seconds = np.full((rows, columns, COURSES, 2), BLOCKED_S, dtype=np.float32)
     if sources.size:
