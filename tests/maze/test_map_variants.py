@@ -61,8 +61,11 @@ def test_unknown_cells_have_a_colour_of_their_own(band):
     figure = Figure()
     axes = figure.subplots()
     draw_maze(axes, load_maze(band))
-    colors = [image.get_cmap().colors[0] for image in axes.images]
-    assert len(set(colors)) == 2
+    images = [image.get_array() for image in axes.images]
+    colors = [np.unique(image[image[..., 3] > 0], axis=0) for image in images]
+    assert [len(color) for color in colors] == [1, 1]
+    assert not np.array_equal(*colors)
+    assert (images[1][..., 3] > 0).sum() == 500
     assert "unknown" in axes.get_legend_handles_labels()[1][0]
 
 
