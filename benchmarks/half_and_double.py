@@ -104,10 +104,10 @@ def calibration() -> Answers:
 
 
 def verdict() -> Answers:
-    """Search what is missing in a set of trials with a tether's drag of a third of its typical size, in six short trials."""
+    """Search what is missing where a tether drags, in six short trials."""
     from srs_opt.discrepancy.pipeline import diagnose
 
-    found = diagnose(_dataset("third"))
+    found = diagnose(_dataset("typical"))
     answers: Answers = {"verdict": found.verdict.word}
     answers["named"] = found.selection.best.label if found.selection else ""
     return answers | ({"left of the gap": found.gap.with_effect / found.gap.calibrated} if found.gap else {})
@@ -189,7 +189,7 @@ def _dataset(kind: str) -> Any:
     from srs_opt.measurement.dataset import load_dataset
 
     with tempfile.TemporaryDirectory() as scratch:
-        hidden = ("tether_drag",) if kind == "third" else ()
+        hidden = ("tether_drag",) if kind == "typical" else ()
         generate(Path(scratch) / "set", kind, hidden, 17, "second", brief=True)
         return load_dataset(Path(scratch) / "set")
 
@@ -223,8 +223,8 @@ def _own(probe: str, tuned: Tuned) -> bool:
     homes = {
         "integrations": "srs_opt.simulate", "orbits": "srs_opt.orbit", "optimum": "srs_opt.gait_opt",
         "manoeuvre": "srs_opt.manoeuvre", "calibration": "srs_opt.calibrate",
-        "verdict": "srs_opt.discrepancy", "plans": "planners.", "drives": "planners.drive", "refined_plan": "planners.refine",
-        "second_opinion": "srs_opt.judge",
+        "verdict": "srs_opt.discrepancy", "plans": "planners.", "drives": "planners.drive",
+        "refined_plan": "planners.refine", "second_opinion": "srs_opt.judge",
     }  # fmt: skip
     return tuned.module.startswith(homes[probe])
 
