@@ -20,9 +20,10 @@ from planners.generate.areas import corridor
 from planners.maze.places import RobotSize
 from planners.plan.certify import certify
 from planners.search.follow import follow, reference_along
-from planners.search.ompl_geometric import STEP, curves_of, poses_along, strip_setup
+from planners.search.ompl_geometric import curves_of, poses_along, strip_setup
 from planners.search.ompl_setup import seeded
 from planners.search.problem import Problem
+from planners.search.settings import ROUTE
 
 METHODS = ("RRTConnect", "BITstar", "RRT", "KPIECE1", "RRTstar")
 Run = tuple[str, float, bool, bool, bool]  # planner, s, exact, its path checks, certified
@@ -70,7 +71,7 @@ def _certified(problem: Problem, planner: Any) -> bool:
     definition = planner.getProblemDefinition()
     if not definition.hasExactSolution():
         return False
-    path = poses_along(definition.getSolutionPath(), STEP * problem.robot.length_m)
+    path = poses_along(definition.getSolutionPath(), ROUTE.step * problem.robot.length_m)
     way = None if path is None else follow(problem, reference_along(problem, path))
     return way is not None and certify(problem, tuple(step.gait for step in way)).passed
 

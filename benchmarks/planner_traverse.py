@@ -26,7 +26,8 @@ from planners.maze.maze import Maze
 from planners.maze.places import RobotSize
 from planners.motion.store import load_motion
 from planners.motion.table import MotionTable
-from planners.plan.solve import BEAM, BEAMS, LatticeSolver
+from planners.plan.solve import BEAMS, LatticeSolver
+from planners.search.beam import BEAM
 from planners.search.problem import Problem
 from srs_opt.files import write_json
 from srs_opt.gait_opt.catalogue import default_table

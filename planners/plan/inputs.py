@@ -19,7 +19,8 @@ from planners.motion.transitions import Progress
 from planners.motion.valves import DEFAULT_LIMITS, ValveLimits, playable
 from planners.plan.options import MARGIN_M
 from planners.search.cost_model import Cost
-from planners.search.problem import MOST_DEVIATION, Problem
+from planners.search.problem import Problem
+from planners.search.settings import RESOLUTION
 from srs_opt.command import chosen_model, progress, say
 from srs_opt.drive.calibration import NO_CALIBRATION, DriveCalibration, load_calibration
 from srs_opt.errors import InputError
@@ -78,7 +79,8 @@ def planning_problem(
         tell(
             f"note: stiffness known within {100 * stiffness_deviation(robot):.0f} %: a cycle may end "
             f"{1e3 * float(np.median(motion.deviation_m[:-1])):.1f} mm off (median gait, two standard "
-            f"deviations); up to {1e3 * MOST_DEVIATION * robot.length_m:.0f} mm of it are kept as room"
+            f"deviations); up to {1e3 * RESOLUTION.most_deviation * robot.length_m:.0f} mm of it are kept as "
+            "room"
         )
     if drive is not None:
         motion = motion.bent(Bending(drive, motion.course))

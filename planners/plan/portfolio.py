@@ -22,7 +22,8 @@ import numpy as np
 from planners.plan.answer import Plan, PlanResult
 from planners.plan.certify import certify
 from planners.plan.registry import OMPLS, OURS, Effort, Planner, planner_named
-from planners.plan.solve import BEAM, TOO_NARROW, LatticeSolver
+from planners.plan.solve import TOO_NARROW, LatticeSolver
+from planners.search.beam import BEAM
 from planners.search.costmap import BLOCKED_S
 from planners.search.ompl_setup import MISSING, has_ompl
 from planners.search.problem import Problem

@@ -11,8 +11,8 @@ from typing import Any
 from planners.plan.answer import Plan, PlanResult, Status
 from planners.plan.certify import Certificate, Certifier
 from planners.plan.explain import narrower_than_any_gait, no_body_fits
-from planners.search.beam import BeamSearch, BeamSettings
-from planners.search.lattice import LatticeSearch, LatticeSettings
+from planners.search.beam import BEAM, BeamSearch, BeamSettings
+from planners.search.lattice import LATTICE, LatticeSearch, LatticeSettings
 from planners.search.problem import ROUNDING_M, Problem
 from planners.search.runs import RUNS, RunSearch, RunSettings
 from planners.search.tree import Root, at_rest
@@ -26,7 +26,6 @@ MORE_SLACK = 0.00212  # body lengths
 # Of the last search: what happens between the samples of a cycle is left to the certificate. Corridors with
 # 0.2 % of a body length to spare are found with it; not at first, as more plans then have to be mended.
 LEAST_SLACK = 0.000424  # body lengths
-BEAM = BeamSettings()
 # what keeps hitting the posts of a narrow passage needs states told apart by millimetres
 FINE_BEAM = BeamSettings(width=40, cell=0.0424, course_rad=0.05, slack=0.000847)
 BEAMS = (BEAM, FINE_BEAM)
@@ -77,7 +76,7 @@ class LatticeSolver:
     ) -> None:
         self.problem, self.stop, self.tell = problem, stop, tell
         self.hand_over = hand_over
-        self.settings, self.beams = settings or LatticeSettings(), beams
+        self.settings, self.beams = settings or LATTICE, beams
         if problem.goal.heading is not None:  # a map of places alone would lead past it
             self.settings = replace(self.settings, by_heading=True)
             self.beams = tuple(replace(beam, by_heading=True) for beam in beams)

@@ -22,10 +22,6 @@ from planners.search.tree import Root, Step, Tree, arrival_index, at_rest, cell_
 from srs_opt.model.state import FORWARD, HEADING, PLACE, X, Y
 
 Array = NDArray[np.float64]
-TOGETHER = 8  # cycles simulated in one batch
-FIRST_LOOK = 32  # gaits whose bodies are looked at first, most promising first
-NARROW, WIDE, WIDTH_TIMES_S = 12, 32, 200.0  # widths of beams, and width times seconds to go
-DOUBTFUL, STALLED = 3, 10  # cycles without progress towards the goal: doubted, given up
 
 
 @dataclass(frozen=True)
@@ -36,6 +32,8 @@ class BeamSettings:
     ----------
     width : int, optional
         States kept per level; by default few on a long way and more on a short one.
+    least_width, most_width, width_times_s : int, int, float
+        Bounds of that, and width times seconds to go. Wider finds faster plans in as much more time.
     branching : int
         Most successors kept of one state.
     cell, course_rad, speed : float
@@ -48,9 +46,19 @@ class BeamSettings:
         Beyond the margin, for what happens between the samples of a cycle.
     by_heading : bool
         Estimate what is left by place, course and direction of travel.
+    first_look : int
+        Gaits whose bodies are looked at first, most promising first; the others only where too few fit.
+    batch : int
+        Cycles simulated side by side. Larger simulates some in vain, smaller takes more time for each.
+    doubted, given_up : int
+        Cycles without progress towards the goal after which the beam is in doubt, and ended. Fewer end
+        beams that have to go round a wall, more hold up the search that comes next.
     """
 
     width: int | None = None
+    least_width: int = 12
+    most_width: int = 32
+    width_times_s: float = 200.0
     branching: int = 4
     cell: float = 0.127
     course_rad: float = math.radians(15)
@@ -59,6 +67,13 @@ class BeamSettings:
     air_s: float = 0.07
     slack: float = 0.00212
     by_heading: bool = False
+    first_look: int = 32
+    batch: int = 8
+    doubted: int = 3
+    given_up: int = 10
+
+
+BEAM = BeamSettings()
 
 
 class _Expansion(NamedTuple):
@@ -86,7 +101,7 @@ class BeamSearch:
         self, problem: Problem, settings: BeamSettings | None = None, root: Root | None = None
     ) -> None:
         root = root or at_rest(problem)
-        self.problem, self.settings = problem, settings or BeamSettings()
+        self.problem, self.settings = problem, settings or BEAM
         self.root_slack_m = root.slack_m
         self.expanded = self.simulated = 0
         first = Cycle(root.state, root.state[None, :3], np.zeros((0, 1, 2)))
@@ -96,7 +111,8 @@ class BeamSearch:
         self._best: tuple[float, int] | None = None
         self._nearest, self._stalled = math.inf, 0
         to_go_s = self._to_go_s(self._front) + 0.1
-        self._width = self.settings.width or round(min(max(WIDTH_TIMES_S / to_go_s, NARROW), WIDE))
+        s = self.settings
+        self._width = s.width or round(min(max(s.width_times_s / to_go_s, s.least_width), s.most_width))
 
     @property
     def exhausted(self) -> bool:
@@ -106,7 +122,7 @@ class BeamSearch:
     @property
     def in_doubt(self) -> bool:
         """Whether the goal has not come nearer for some cycles."""
-        return self._stalled >= DOUBTFUL
+        return self._stalled >= self.settings.doubted
 
     def advance(self, expansions: int) -> list[Step] | None:
         """Advance the beam by about `expansions` states; return the way to the goal when it has ended."""
@@ -116,7 +132,7 @@ class BeamSearch:
             nearest = self._to_go_s(self._front)
             self._stalled = 0 if nearest < self._nearest else self._stalled + 1
             self._nearest = min(nearest, self._nearest)
-            if self._stalled == STALLED:
+            if self._stalled == self.settings.given_up:
                 self._front = []
         if self._front or self._best is None:
             return None
@@ -145,9 +161,11 @@ class BeamSearch:
         for mine, before in zip(left, begin.before.tolist()):
             order = np.argsort(mine + motion.period_s, kind="stable")
             orders.append(order[(mine[order] < BLOCKED_S / 2) & motion.may_follow(before)[order]])
-        found = self._fitting(begin, list(range(len(nodes))), [order[:FIRST_LOOK] for order in orders], left)
+        found = self._fitting(
+            begin, list(range(len(nodes))), [order[: s.first_look] for order in orders], left
+        )
         few = [k for k, mine in enumerate(found) if len(mine) < s.branching]
-        more = self._fitting(begin, few, [orders[k][FIRST_LOOK:] for k in few], left)
+        more = self._fitting(begin, few, [orders[k][s.first_look :] for k in few], left)
         return [expansion for mine in (*found, *more) for expansion in mine]
 
     def _fitting(
@@ -178,8 +196,9 @@ class BeamSearch:
         """Simulate expansions, best first, until the front is full again."""
         s, front = self.settings, []
         taken: dict[int, int] = {}
-        for first in range(0, len(expansions), TOGETHER):
-            batch = [o for o in expansions[first : first + TOGETHER] if taken.get(o.parent, 0) < s.branching]
+        for first in range(0, len(expansions), s.batch):
+            some = expansions[first : first + s.batch]
+            batch = [o for o in some if taken.get(o.parent, 0) < s.branching]
             if self._best is not None:
                 batch = [o for o in batch if o.rank < self._best[0]]
                 if not batch:

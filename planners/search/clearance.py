@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from planners.maze.field import DistanceField
 from planners.maze.maze import Maze
+from planners.search.settings import RESOLUTION
 
 Array = NDArray[np.float64]
-UNSURE_M = 0.001  # beyond the table's error, so that the nearest wall is found for certain
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class BodyClearance:
         `estimate` may be given where it is known.
         """
         roughly = self.estimate(lines) if roughly is None else roughly
-        upper = roughly + self.half_width_m + self.field.error_m + UNSURE_M
+        upper = roughly + self.half_width_m + self.field.error_m + RESOLUTION.nearest_m
         return self.maze.clearances(shapely.linestrings(lines), upper) - self.half_width_m
 
     def keeps_margin(self, lines: Array, slack_m: float = 0.0, roughly: Array | None = None) -> bool:

@@ -11,6 +11,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from planners.search.settings import COST
 from srs_opt.gait import Gait
 from srs_opt.gait_opt.goal import air_work_j, chamber_volume_m3
 from srs_opt.gait_opt.table import GaitTable
@@ -19,13 +20,6 @@ from srs_opt.robot import Robot
 Array = NDArray[np.float64]
 Cost = Literal["time", "length", "clearance", "air"]
 COSTS: tuple[Cost, ...] = get_args(Cost)
-TIME_COUNTS = (
-    0.3  # of a second per second where time is not the cost: else the slowest plan would cost no more
-)
-NEAR_WIDTHS, NEAR_FACTOR = 2.0, 3.0  # within so many body widths of a wall, up to so many times more
-TYPICAL_OVER_LEAST = 1.3  # cost of a typical metre over one with the cheapest gait, straight and steady
-START_UP_S = 0.6  # extra cost of a start from rest
-SLOW = 0.1  # of the top speed; slower gaits are left out of the cost of a metre
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +53,7 @@ class CostModel:
     @property
     def start_up(self) -> float:
         """Return the extra cost of a start from rest (of air, more)."""
-        return {"length": TIME_COUNTS, "air": 1.5}.get(self.cost, START_UP_S)
+        return {"length": COST.time_share, "air": COST.start_up_air}.get(self.cost, COST.start_up_s)
 
     @property
     def top_speed_m_s(self) -> float:
@@ -90,8 +84,8 @@ class CostModel:
             return period * self._nearness(spare_m)
         if self.cost == "length":
             way = np.hypot(*np.diff(pose[..., :2], axis=-2).transpose(2, 0, 1)).sum(axis=-1)
-            return np.asarray(way / self.top_speed_m_s + TIME_COUNTS * period)
-        return self.air_j[gaits] / self._air_w + TIME_COUNTS * period
+            return np.asarray(way / self.top_speed_m_s + COST.time_share * period)
+        return self.air_j[gaits] / self._air_w + COST.time_share * period
 
     def per_metre(self, in_time: Array, spare_m: Array) -> Array:
         """Return costs per metre where a metre takes `in_time` seconds and `spare_m` is beside the body."""
@@ -100,15 +94,15 @@ class CostModel:
         if self.cost == "clearance":
             return in_time * self._nearness(spare_m)
         if self.cost == "length":
-            return np.full(in_time.shape, 1 / self.top_speed_m_s) + TIME_COUNTS * in_time
-        moving = self.speed_m_s > SLOW * self.top_speed_m_s
+            return np.full(in_time.shape, 1 / self.top_speed_m_s) + COST.time_share * in_time
+        moving = self.speed_m_s > COST.slow * self.top_speed_m_s
         least = (self.air_j[moving] / (self.speed_m_s[moving] * self.period_s[moving])).min()
-        price: Array = TYPICAL_OVER_LEAST * least / self._air_w + TIME_COUNTS * in_time
+        price: Array = COST.typical_over_least * least / self._air_w + COST.time_share * in_time
         return price
 
     def _nearness(self, spare_m: Array) -> Array:
         """Return the factor on the cost near walls."""
-        return 1 + NEAR_FACTOR * np.clip(1 - spare_m / (NEAR_WIDTHS * self.body_width_m), 0.0, 1.0)
+        return 1 + COST.near_factor * np.clip(1 - spare_m / (COST.near_widths * self.body_width_m), 0.0, 1.0)
 
 
 def gait_air_j(robot: Robot, gait: Gait) -> float:

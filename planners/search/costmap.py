@@ -12,13 +12,11 @@ from numpy.typing import NDArray
 
 from planners.maze.field import DistanceField
 from planners.maze.places import Goal
+from planners.search.settings import COST_MAP
 from srs_opt.gait_opt.table import GaitTable
 
 Array = NDArray[np.float64]
-NODES, MOST_NODES = 40_000, 1_500_000
-FINEST = 0.3  # of half the body's width
-BLOCKED_S = 1e6
-COMFORT = 1.5  # times the reach of the fastest gait is room enough for every gait at full speed
+BLOCKED_S = 1e6  # stands for: no way
 # neighbours up to a knight's move: paths at most 2.7 % too long
 _STEPS = [(0, 1), (1, 0), (1, 1), (1, -1), (1, 2), (2, 1), (1, -2), (2, -1)]
 
@@ -86,10 +84,10 @@ def cost_map(
 
     xmin, ymin, xmax, ymax = field.bounds
     area = (xmax - xmin) * (ymax - ymin)
-    blocked = 0.6 * half_width_m
+    blocked = COST_MAP.blocked * half_width_m
     # finer than the blocked strip about the thinnest wall, so that no cell has nodes on both sides of it
-    spacing = min(max(math.sqrt(area / NODES), FINEST * half_width_m), 2 * blocked)
-    spacing = max(spacing, math.sqrt(area / MOST_NODES))
+    spacing = min(max(math.sqrt(area / COST_MAP.nodes), COST_MAP.finest * half_width_m), 2 * blocked)
+    spacing = max(spacing, math.sqrt(area / COST_MAP.most_nodes))
     columns, rows = (max(2, math.ceil(side / spacing)) for side in (xmax - xmin, ymax - ymin))
     x, y = xmin + spacing * (np.arange(columns) + 0.5), ymin + spacing * (np.arange(rows) + 0.5)
     nodes = np.stack(np.meshgrid(x, y), axis=-1)
@@ -146,8 +144,9 @@ def _graph(clear: NDArray[np.bool_], per_node: Array, spacing: float) -> Any:
 def slowness(room: Array, reach: Array, speed: Array) -> Array:
     """Return seconds per metre: the fastest gait that fits, and a little less where it just fits."""
     fitting = np.searchsorted(reach, room, side="right") - 1
-    best = np.where(fitting >= 0, speed[np.maximum(fitting, 0)], 0.25 * speed[0])
-    best = np.maximum(best, 0.1 * speed[-1])
-    comfortable = np.clip(room / (COMFORT * reach[int(speed.argmax())]), 0.3, 1.0)
+    best = np.where(fitting >= 0, speed[np.maximum(fitting, 0)], COST_MAP.unfitting * speed[0])
+    best = np.maximum(best, COST_MAP.least_speed * speed[-1])
+    enough_m = COST_MAP.comfort * reach[int(speed.argmax())]
+    comfortable = np.clip(room / enough_m, COST_MAP.least_comfort, 1.0)
     cost: Array = 1 / (best * comfortable)
     return cost

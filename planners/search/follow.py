@@ -7,14 +7,12 @@ from numpy.typing import NDArray
 
 from planners.search.costmap import speed_by_room
 from planners.search.problem import Problem
+from planners.search.settings import FOLLOW
 from planners.search.track import Learned, Reference, Where, choose, nearest_node
 from planners.search.tree import Step, arrival_index, at_rest
 from srs_opt.model.state import FORWARD, POSE
 
 Array = NDArray[np.float64]
-SPACING = 0.127  # body lengths between the nodes of a reference
-PATIENCE = 4.0  # times the cycles that the path should take
-CYCLE_S = 0.5
 
 
 def reference_along(problem: Problem, path: Array) -> Reference:
@@ -25,7 +23,7 @@ def reference_along(problem: Problem, path: Array) -> Reference:
     path = path[keep]
     steps, far = np.diff(path[:, :2], axis=0), np.hypot(*np.diff(path[:, :2], axis=0).T)
     along = np.concatenate([[0.0], np.cumsum(far)])
-    at = np.linspace(0.0, along[-1], max(2, int(along[-1] / (SPACING * problem.robot.length_m))))
+    at = np.linspace(0.0, along[-1], max(2, int(along[-1] / (FOLLOW.spacing * problem.robot.length_m))))
     heading = np.interp(at, along, np.unwrap(path[:, 2]))
     x, y = np.interp(at, along, path[:, 0]), np.interp(at, along, path[:, 1])
     forward = np.cos(path[:-1, 2]) * steps[:, 0] + np.sin(path[:-1, 2]) * steps[:, 1] >= 0
@@ -42,7 +40,7 @@ def follow(problem: Problem, reference: Reference) -> list[Step] | None:
     root = at_rest(problem)
     state, gait, node = root.state, root.gait, 0
     steps: list[Step] = []
-    for _ in range(10 + int(PATIENCE * reference.left_s[0] / CYCLE_S)):
+    for _ in range(10 + int(FOLLOW.patience * reference.left_s[0] / FOLLOW.cycle_s)):
         where = Where(state[POSE], gait, float(state[FORWARD]))
         choice = choose(problem, reference, where, Learned(), node)
         cycle = problem.simulate(state, gait, choice.gait)

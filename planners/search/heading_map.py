@@ -19,16 +19,12 @@ from numpy.typing import NDArray
 from planners.maze.field import DistanceField
 from planners.maze.places import Goal
 from planners.search.costmap import BLOCKED_S
+from planners.search.settings import HEADING_MAP
 from srs_opt.gait_opt.table import GaitTable
 
 Array = NDArray[np.float64]
 COURSES = 16  # the directions of a knight's moves: straight edges in them have no rounding
 STEP_RAD = 2 * math.pi / COURSES
-# Nodes to the chord of the tightest turn by one course. Below 1.7 a turn and a straight move end alike; 5
-# tells ways apart that differ by a millimetre or two, which is worth it while there are few states.
-COARSE, FINE = 1.7, 5.0
-FEW_STATES, MOST_STATES = 250_000, 1_500_000  # about 100 bytes each while the map is made
-SLOW = 0.2  # of the top speed; slower turning gaits are not counted on
 _MOVES = [(1, 0), (2, 1), (1, 1), (1, 2), (0, 1), (-1, 2), (-1, 1), (-2, 1)]
 MOVES = np.array(_MOVES + [(-x, -y) for x, y in _MOVES])
 
@@ -92,9 +88,14 @@ def turns_of(table: GaitTable) -> tuple[list[Turn], tuple[float, float]]:
         speeds = [abs(e.speed_m_s) for e in entries if e.radius_m is not None and abs(e.radius_m) <= most_m]
         return max(speeds, default=0.0)
 
-    radii = [abs(e.radius_m) for e in table.gaits if e.radius_m is not None and abs(e.speed_m_s) > SLOW * top]
+    radii = [
+        abs(e.radius_m)
+        for e in table.gaits
+        if e.radius_m is not None and abs(e.speed_m_s) > HEADING_MAP.slow * top
+    ]
+    same = HEADING_MAP.same_radius
     turns = [
-        Turn(radius, best(forward, 1.05 * radius), best(back, 1.05 * radius))
+        Turn(radius, best(forward, same * radius), best(back, same * radius))
         for radius in ((min(radii), 2 * min(radii)) if radii else ())
     ]
     straight = tuple(max((abs(e.speed_m_s) for e in entries), default=0.0) for entries in (forward, back))
@@ -135,16 +136,19 @@ def heading_map(
     tightest = turns[0].radius_m if turns else 0.02 * (width + height)
     chord_m = 2 * tightest * math.sin(STEP_RAD / 2)
     # a look at more than four times as many nodes as may be free is not worth it
-    spacing = max(chord_m / FINE, math.sqrt(width * height * 2 * COURSES / (4 * MOST_STATES)))
+    spacing = max(
+        chord_m / HEADING_MAP.fine, math.sqrt(width * height * 2 * COURSES / (4 * HEADING_MAP.most_states))
+    )
     while True:
         columns, rows = max(2, math.ceil(width / spacing)), max(2, math.ceil(height / spacing))
         x, y = xmin + spacing * (np.arange(columns) + 0.5), ymin + spacing * (np.arange(rows) + 0.5)
         nodes = np.stack(np.meshgrid(x, y), axis=-1)
         room = field.clearance(nodes)
         free = (room > reach_m) & wanted(nodes)
-        if free.sum() * 2 * COURSES <= (FEW_STATES if spacing < chord_m / COARSE else MOST_STATES):
+        most = HEADING_MAP.few_states if spacing < chord_m / HEADING_MAP.coarse else HEADING_MAP.most_states
+        if free.sum() * 2 * COURSES <= most:
             break
-        spacing *= 1.25
+        spacing *= HEADING_MAP.coarsening
     number = np.full((rows, columns), -1, dtype=np.int32)
     number[free] = np.arange(free.sum(), dtype=np.int32)
     place = np.argwhere(free)

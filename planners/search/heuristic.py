@@ -7,11 +7,10 @@ from numpy.typing import NDArray
 
 from planners.search.costmap import BLOCKED_S
 from planners.search.problem import Problem
+from planners.search.settings import HEURISTIC
 from srs_opt.geometry import points_in_room
 
 Array = NDArray[np.float64]
-MOST_GAIN = 5.0  # a point of the body may promise at most so many times the time of the way to it
-OFF_THE_WAY_S = 1.0  # added where the head is in a dead end
 
 
 def cost_to_go(problem: Problem, end: Array, speed_m_s: Array, by_heading: bool = False) -> Array:
@@ -42,7 +41,7 @@ def _by_heading(problem: Problem, end: Array) -> tuple[Array, Array]:
     course = end[..., 2] + problem.motion.course[:-1]
     middle = problem.to_goal.at(end[..., :2])
     left = problem.to_goal_by_heading.at(end[..., :2], course, problem.motion.steady_speed_m_s < 0)
-    return np.where(left < BLOCKED_S, left, middle + OFF_THE_WAY_S), middle
+    return np.where(left < BLOCKED_S, left, middle + HEURISTIC.dead_end_s), middle
 
 
 def _by_place(problem: Problem, end: Array) -> tuple[Array, Array]:
@@ -52,10 +51,10 @@ def _by_place(problem: Problem, end: Array) -> tuple[Array, Array]:
     along = lever * np.stack([np.cos(course), np.sin(course)], axis=-1)
     where = end[..., :2]
     middle, head, front = problem.to_goal.at(np.stack([where, where + along, where + 0.5 * along]))
-    head = np.where(head < BLOCKED_S, head, middle + OFF_THE_WAY_S)
-    front = np.where(front < BLOCKED_S, front, middle + 0.5 * OFF_THE_WAY_S)
+    head = np.where(head < BLOCKED_S, head, middle + HEURISTIC.dead_end_s)
+    front = np.where(front < BLOCKED_S, front, middle + 0.5 * HEURISTIC.dead_end_s)
     # a point that is nearer to the goal by more than the way to it takes lies behind a wall
-    gain = MOST_GAIN * lever / problem.cost_model.top_speed_m_s
+    gain = HEURISTIC.most_gain * lever / problem.cost_model.top_speed_m_s
     head, front = np.maximum(head, middle - gain), np.maximum(front, middle - 0.5 * gain)
     return (middle + 2 * head + front) / 4, middle
 

@@ -56,6 +56,9 @@ class LatticeSettings:
     by_heading: bool = False
 
 
+LATTICE = LatticeSettings()
+
+
 class LatticeSearch:
     """A search that can be asked for the next plan until nothing is left."""
 
@@ -65,7 +68,7 @@ class LatticeSearch:
         root = root or at_rest(problem)
         self.problem = problem
         self.root_slack_m = root.slack_m
-        self.settings = settings or LatticeSettings()
+        self.settings = settings or LATTICE
         self.expanded = 0
         self.simulated = 0
         self._tree = Tree()

@@ -17,13 +17,10 @@ from numpy.typing import NDArray
 from planners.search.follow import follow, reference_along
 from planners.search.ompl_setup import counted, seeded, until_a_signal
 from planners.search.problem import Problem
+from planners.search.settings import ROUTE
 from planners.search.tree import Step
 
 Array = NDArray[np.float64]
-STEP = 0.0847  # body lengths between the poses at which a path is checked and given back
-BEFORE = 0.636  # body lengths before the goal, from where the way to it gives the heading
-SLOWEST = 0.212  # body lengths per second; slower gaits do not make routes
-STRIP_POINTS = 7
 
 
 @dataclass(frozen=True)
@@ -44,19 +41,19 @@ def curves_of(problem: Problem) -> tuple[Curves, Curves]:
     turning = [
         e
         for e in problem.gaits.gaits
-        if e.radius_m is not None and e.speed_m_s > SLOWEST * problem.robot.length_m
+        if e.radius_m is not None and e.speed_m_s > ROUTE.slowest * problem.robot.length_m
     ]
     # of the calibrated drive
     radii = problem.drive.radius.value * np.array([abs(e.radius_m or 0.0) for e in turning])
     bands = np.array([sum(e.envelope_m) / 2 for e in turning])
     if not radii.size:
-        return (Curves(4.24 * problem.robot.length_m, problem.robot.body_width_m),) * 2
+        return (Curves(ROUTE.straight * problem.robot.length_m, problem.robot.body_width_m),) * 2
     slimmest = min(
         sum(e.envelope_m) / 2
         for e in problem.gaits.gaits
-        if abs(e.speed_m_s) > SLOWEST * problem.robot.length_m
+        if abs(e.speed_m_s) > ROUTE.slowest * problem.robot.length_m
     )
-    easy = Curves(1.3 * float(radii.min()), float(np.median(bands)))
+    easy = Curves(ROUTE.easy * float(radii.min()), float(np.median(bands)))
     return easy, Curves(float(radii.min()), max(slimmest, problem.robot.body_width_m / 2))
 
 
@@ -103,7 +100,7 @@ def geometric_path(
         path = setup.getSolutionPath()
         # the simplifier's rounds are counted, not timed
         geometric.PathSimplifier(info).reduceVertices(path, 50, 50, 0.5)
-        return poses_along(path, STEP * problem.robot.length_m)
+        return poses_along(path, ROUTE.step * problem.robot.length_m)
 
     return until_a_signal(found)
 
@@ -129,11 +126,11 @@ def strip_setup(problem: Problem, kind: str, curves: Curves) -> Any:
     setup = geometric.SimpleSetup(space)
     setup.setStateValidityChecker(_strip_checker(problem, curves))
     info = setup.getSpaceInformation()
-    info.setStateValidityCheckingResolution(STEP * problem.robot.length_m / space.getMaximumExtent())
+    info.setStateValidityCheckingResolution(ROUTE.step * problem.robot.length_m / space.getMaximumExtent())
     start, goal = space.allocState(), space.allocState()
     _set(start, problem.start.x, problem.start.y, problem.start.heading)
     _set(goal, *_goal_pose(problem))
-    setup.setStartAndGoalStates(start, goal, 0.0424 * problem.robot.length_m)
+    setup.setStartAndGoalStates(start, goal, ROUTE.goal * problem.robot.length_m)
     return setup
 
 
@@ -148,7 +145,7 @@ def poses_along(path: Any, step_m: float) -> Array | None:
 def _strip_checker(problem: Problem, curves: Curves) -> Any:
     """Return the check that a straight strip at a pose keeps off the walls."""
     half = problem.robot.length_m / 2 - problem.robot.body_width_m / 2
-    offsets = np.linspace(-half, half, STRIP_POINTS)
+    offsets = np.linspace(-half, half, ROUTE.strip_points)
     field = problem.field
     keep = curves.half_width_m + problem.margin_m
     # the start may be nearer to a wall than a gait sweeps
@@ -167,7 +164,7 @@ def _goal_pose(problem: Problem) -> tuple[float, float, float]:
     """Return a pose in the goal: where the quickest way for a point arrives, and its heading there."""
     trail = [np.array([problem.start.x, problem.start.y])]
     turns = np.arange(0.0, 2 * math.pi, math.pi / 8)
-    step_m = STEP * problem.robot.length_m
+    step_m = ROUTE.step * problem.robot.length_m
     circle = step_m * np.stack([np.cos(turns), np.sin(turns)], axis=1)
     # downhill on the time to go; it falls by a step's worth at least, so this ends
     for _ in range(int(1e5)):
@@ -177,7 +174,7 @@ def _goal_pose(problem: Problem) -> tuple[float, float, float]:
             break
         trail.append(following)
     last = trail[-1]
-    before = trail[max(0, len(trail) - 1 - round(BEFORE / STEP))]
+    before = trail[max(0, len(trail) - 1 - round(ROUTE.before / ROUTE.step))]
     heading = problem.goal.heading
     if heading is None:
         heading = math.atan2(last[1] - before[1], last[0] - before[0])

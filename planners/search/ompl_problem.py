@@ -2,8 +2,9 @@
 
 State: SE(2) and the number of a node of `Memory`, which holds what OMPL need not know (the state of the
 dynamic model, the gait before, the cost so far). Control: the gait table, a gait's index as a floored real,
-held for 1 to `MOST_CYCLES` cycles. Propagator: cycles of the dynamic model. Validity: the swept body keeps
-the margin; a cycle that does not gets the number -1. Objective: the cost of the problem (`--cost`).
+held for one to a few cycles (`CycleControlSettings`). Propagator: cycles of the dynamic model. Validity: the
+swept body keeps the margin; a cycle that does not gets the number -1. Objective: the cost of the problem
+(`--cost`).
 """
 
 from __future__ import annotations
@@ -16,12 +17,10 @@ from typing import Any
 import numpy as np
 
 from planners.search.problem import Cycle, Problem
+from planners.search.settings import CYCLE_CONTROL
 from planners.search.tree import Tree, arrival_index, at_rest
 
-MOST_CYCLES = 6  # that one control is held
-SLACK = 0.00212  # body lengths beyond the margin, for what happens between the samples of a cycle
-FAR = 0.0424  # body lengths that what is not in the goal is at least away from it
-TOO_NEAR = -1
+TOO_NEAR = -1  # in place of a node's number
 
 
 @dataclass
@@ -62,7 +61,9 @@ class Memory:
         (cycle,) = problem.simulate_all([(tree.cycle[number].state, before, gait)])
         if cycle is None:
             return TOO_NEAR
-        slack = problem.start_slack_m if number == 0 else SLACK * problem.robot.length_m + cycle.tube_m
+        slack = problem.start_slack_m
+        if number:
+            slack = CYCLE_CONTROL.slack * problem.robot.length_m + cycle.tube_m
         if not problem.body.keeps_margin(cycle.lines, slack):
             return TOO_NEAR
         return self.add(number, gait, cycle)
@@ -123,7 +124,7 @@ def cycle_setup(problem: Problem) -> CycleSetup:
     setup = control.SimpleSetup(controls)
     info = setup.getSpaceInformation()
     info.setPropagationStepSize(1.0)  # the unit of durations is a cycle
-    info.setMinMaxControlDuration(1, MOST_CYCLES)
+    info.setMinMaxControlDuration(1, CYCLE_CONTROL.most_cycles)
 
     def propagate(state: Any, command: Any, duration: float, result: Any) -> None:
         number, gait = int(state[1][0]), gait_of(problem, command)
@@ -215,7 +216,7 @@ def _goal(base: Any, info: Any, problem: Problem, memory: Memory) -> Any:
             number = int(state[1][0])
             if number in memory.arrived:
                 return 0.0
-            return FAR * problem.robot.length_m + float(
+            return CYCLE_CONTROL.away * problem.robot.length_m + float(
                 problem.to_goal.at(memory.tree.cycle[max(number, 0)].pose[-1, :2])
             )
 

@@ -22,6 +22,7 @@ from planners.search.clearance import BodyClearance
 from planners.search.cost_model import Cost, CostModel
 from planners.search.costmap import CostMap, cost_map, slowness, speed_by_room
 from planners.search.heading_map import HeadingMap, heading_map
+from planners.search.settings import RESOLUTION
 from srs_opt.drive.calibration import NO_CALIBRATION, DriveCalibration
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait_opt.table import GaitTable
@@ -34,20 +35,7 @@ from srs_opt.simulate.integrate import Integrator, Trajectory
 from srs_opt.simulate.shapes import centre_lines
 
 Array = NDArray[np.float64]
-ROUNDING_M = 1e-6
-# Of the shortest way, and body lengths more: longer detours are not looked at.
-DETOUR_TIMES, DETOUR_LENGTHS = 1.5, 16.0
-FIELD = 0.0212  # body lengths between the nodes of the distance field, where the maze is small enough
-# The same, and most nodes, of the finer field: it errs by 1.4 mm beside 7 mm with the built-in robot. Where a
-# coarse one lets cycles pass that touch, nine of ten are simulated in vain.
-FINE_FIELD, FINE_NODES = 0.00424, 1_500_000
-# Body lengths (10 mm): plans keep this much room at most for a stiffness's deviation. What a cycle may be off
-# would close most mazes where a stiffness is known within a factor; the driver sees and learns every cycle.
-MOST_DEVIATION = 0.0424
-# Integration step of searches: a cycle's heading errs by 0.2 to 0.3 mrad (root mean square), with half of the
-# step by 0.05. Errors add up: ways that take longer than LONG_S get shorter steps, at least SHORTEST of it;
-# else certificates refuse plans of a hundred cycles again and again.
-STEP_S, LONG_S, SHORTEST = 0.002, 30.0, 1 / 3
+ROUNDING_M = 1e-6  # that a clearance may miss the margin by
 
 
 @dataclass(frozen=True)
@@ -120,10 +108,10 @@ class Problem:
     def field(self) -> DistanceField:
         """Distances to walls."""
         if not self.fine:
-            return DistanceField.of(self.maze, finest_m=FIELD * self.robot.length_m)
+            return DistanceField.of(self.maze, finest_m=RESOLUTION.field * self.robot.length_m)
         xmin, ymin, xmax, ymax = self.maze.bounds
-        spacing = max(FINE_FIELD * self.robot.length_m, math.sqrt((xmax - xmin) * (ymax - ymin) / FINE_NODES))
-        return DistanceField.of(self.maze, spacing)
+        least_m = math.sqrt((xmax - xmin) * (ymax - ymin) / RESOLUTION.fine_nodes)
+        return DistanceField.of(self.maze, max(RESOLUTION.fine_field * self.robot.length_m, least_m))
 
     @cached_property
     def finer(self) -> Problem:
@@ -153,11 +141,11 @@ class Problem:
         radius = 0.1 * self.robot.length_m
         from_start = cost_map(self.field, Goal(start.x, start.y, radius), self.gaits, half, self._per_metre)
         least = float(self.to_goal.at(np.array([start.x, start.y])))
-        detour = DETOUR_LENGTHS * self.robot.length_m / self.cost_model.top_speed_m_s
+        detour = RESOLUTION.detour * self.robot.length_m / self.cost_model.top_speed_m_s
 
         def near_the_way(nodes: Array) -> NDArray[np.bool_]:
             cost = self.to_goal.at(nodes) + from_start.at(nodes)
-            return cost < DETOUR_TIMES * least + detour
+            return cost < RESOLUTION.detour_times * least + detour
 
         def cost_per_metre(room: Array) -> Array:
             return self._per_metre(slowness(room, *speed_by_room(self.gaits)), room)
@@ -196,7 +184,7 @@ class Problem:
 
     def tube_m(self, pose: Array, number: int) -> Array:
         """Return the room beyond the margin that a cycle keeps for where it may end otherwise."""
-        most_m = MOST_DEVIATION * self.robot.length_m
+        most_m = RESOLUTION.most_deviation * self.robot.length_m
         return self.bending.tube_m(pose, self.motion.row(number), most_m)
 
     @property
@@ -212,7 +200,8 @@ class Problem:
     def _step_s(self) -> float:
         """Return the step of searches, shorter the longer the way is."""
         way_s = float(self.to_goal.at(np.array([self.start.x, self.start.y])))
-        step_s = STEP_S * max(math.sqrt(LONG_S / max(way_s, LONG_S)), SHORTEST)
+        s = RESOLUTION
+        step_s = s.step_s * max(math.sqrt(s.long_s / max(way_s, s.long_s)), s.shortest)
         return step_s / 2 if self.fine else step_s
 
     def _cycle(self, before: int, gait: int) -> CycleRun:

@@ -26,8 +26,6 @@ from planners.search.problem import Cycle, Problem
 from planners.search.tree import Root, Step, Tree, arrival_index, at_rest, cell_of
 from srs_opt.model.state import FORWARD, HEADING, PLACE, X, Y
 
-TOGETHER = 16  # cycles simulated in one batch
-
 
 @dataclass(frozen=True)
 class RunSettings:
@@ -53,6 +51,8 @@ class RunSettings:
     table_error : float
         By how much the motion table may have a body nearer to a wall than the simulation; at changes of gait
         it is up to 16 mrad off. Half misses ways with a millimetre to spare.
+    batch : int
+        Cycles simulated side by side. Larger simulates some in vain, smaller takes more time for each.
     """
 
     cell: float = 0.0106
@@ -65,6 +65,7 @@ class RunSettings:
     left_per_s: float = 0.3
     slack: float = 0.000424
     table_error: float = 0.0106
+    batch: int = 16
 
 
 RUNS = RunSettings()
@@ -135,7 +136,7 @@ class RunSearch:
         """Return the most promising proposals; a region's looks since count against its own."""
         batch: list[_Proposal] = []
         cells: set[_Key] = set()
-        while self._open and len(batch) < TOGETHER:
+        while self._open and len(batch) < self.settings.batch:
             proposal = heapq.heappop(self._open)
             if proposal.cell in self._closed or proposal.cell in cells:
                 continue

@@ -20,7 +20,6 @@ from planners.search.tree import arrival_index
 from srs_opt.geometry import compose, points_in_room, rotate, wrapped
 
 Array = NDArray[np.float64]
-_THIN = 3  # every third sample of a cycle is looked at
 
 
 @dataclass(frozen=True)
@@ -53,6 +52,8 @@ class TrackSettings:
         double follows the noise of single ones.
     least_way : float
         A cycle that should go less far teaches nothing about the stretch.
+    thinned : int
+        Every so many samples of a cycle are looked at. Larger may miss a touch, smaller takes time.
     """
 
     place: float = 0.0847
@@ -69,6 +70,7 @@ class TrackSettings:
     nodes_per_cycle: int = 6
     learning: float = 0.3
     least_way: float = 0.0212
+    thinned: int = 3
 
 
 DEFAULT_TRACK = TrackSettings()
@@ -241,7 +243,8 @@ def _grow(
     order = order[motion.may_follow(where.gait)[order]]
     if branch.first is None:
         order = np.setdiff1d(order, list(barred))
-    lines = points_in_room(motion.body[motion.row(where.gait), order, 1::_THIN], pose[order, 1::_THIN])
+    thinned = settings.thinned
+    lines = points_in_room(motion.body[motion.row(where.gait), order, 1::thinned], pose[order, 1::thinned])
     room, length = _room(problem, lines, settings), problem.robot.length_m
     grown = []
     for gait, clearance in zip(map(int, order), map(float, room)):

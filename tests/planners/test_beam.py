@@ -3,8 +3,10 @@
 import numpy as np
 from planner_rooms import maze_of
 
-from planners.plan.solve import BEAM, LatticeSolver
-from planners.search.heuristic import MOST_GAIN, cost_to_go
+from planners.plan.solve import LatticeSolver
+from planners.search.beam import BEAM
+from planners.search.heuristic import cost_to_go
+from planners.search.settings import HEURISTIC
 
 THIN_M = 0.006
 
@@ -23,7 +25,7 @@ def test_a_head_across_a_wall_promises_little(problem_in):
     here = np.array([0.8, 0.34, np.pi / 2])
     middle = float(problem.to_goal.at(here[:2]))
     head = float(problem.to_goal.at(here[:2] + [0.0, problem.robot.length_m / 2]))
-    gain = MOST_GAIN * problem.robot.length_m / 2 / problem.cost_model.top_speed_m_s
+    gain = HEURISTIC.most_gain * problem.robot.length_m / 2 / problem.cost_model.top_speed_m_s
     assert head < middle - 1.5 * gain, "the head is across the wall, far on the way"
     gaits = problem.motion.size
     ends = np.tile(here, (gaits, 1))
