@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from planners.plan.certify import EXACT_BELOW
+from planners.plan.settings import PLAN_CERTIFICATE
 from planners.search.clearance import BodyClearance
 from planners.search.problem import Problem
 from planners.search.tree import arrival_index
@@ -34,7 +34,7 @@ class BodyWatch:
         self._goal = problem.goal
         self._body = BodyClearance(problem.maze, problem.field, robot.body_width_m / 2, 0.0)
         self._run = run
-        self._exact_below_m = EXACT_BELOW * robot.length_m
+        self._exact_below_m = PLAN_CERTIFICATE.exact_below * robot.length_m
         self._time: list[Array] = []
         self._pose: list[Array] = []
         self._lines: list[Array] = []

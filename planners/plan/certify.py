@@ -3,8 +3,8 @@
 Nothing of the search is used but the order of its gaits: the model is integrated adaptively from rest, and
 at every node of that integration the body's capsules are measured against the walls themselves.
 
-The integration's own error is bounded and taken off. The plan is integrated with two tolerances a factor
-FINER apart, and with ramps of pressure whose error is as much apart; the finer integration errs fifteen to a
+The integration's own error is bounded and taken off. The plan is integrated with two tolerances, a factor
+apart, and with ramps of pressure whose error is as much apart; the finer integration errs fifteen to a
 hundred times less, so that a third of the distance between the two bounds its error with room to spare
 (Richardson). The largest distance so far counts, since an error may pass through zero. A heading that is off
 moves the body by its lever arm, and so the bound grows with the way as the error does. Where it is above a
@@ -19,11 +19,11 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from planners.plan.settings import PLAN_CERTIFICATE
 from planners.search.problem import ROUNDING_M, Problem
 from planners.search.tree import Root, arrival_index, at_rest
 from srs_opt.errors import NoAnswerError
 from srs_opt.geometry import points_in_room
-from srs_opt.manoeuvre.settings import REGULATOR
 from srs_opt.model.outline import POINTS_PER_ARC
 from srs_opt.simulate.batched import Search, run_batched
 from srs_opt.simulate.integrate import Trajectory
@@ -31,23 +31,6 @@ from srs_opt.simulate.interpolate import linear
 from srs_opt.simulate.shapes import centre_lines
 
 Array = NDArray[np.float64]
-# Of the coarsest integration, body lengths per second: at two lengths per second it errs by 0.0001 in 40.
-# With four times as much, most mazes of 16 x 16 cells ask for a third tolerance, in twice the time.
-TOLERANCE = 1.06e-5
-# Of the ramps of pressure; with the search's stairs they alone would err by 2 mm in 20 m.
-CERTIFIED_STAIR_S = REGULATOR.stair_s / 4
-FINER = 16.0  # twice as many steps
-LEVELS = 4  # tolerances at most; the last errs by a few micrometres in a hundred metres
-RATIO = 4.0  # of the errors of two levels at least; 15 to 113 was seen over 94 m. 2.5 would double the bound
-SHARE = 0.1  # of the clearance, that the bound may be
-GLANCES = 12  # bodies per cycle that are looked at while cycles are integrated
-SURE = (
-    0.02  # body lengths inside a wall, that no error of the coarser integration explains in a hundred metres
-)
-COMPARED = 4  # every so many nodes of the coarser one: errors change within cycles, not within steps
-EXACT_BELOW = 0.127  # body lengths of clearance; above, the table's lower bound will do
-# Body lengths of margin below which the body is looked at twice as often: every 2 ms it moves 0.004 of them.
-SMALL_MARGIN = 0.0127
 
 
 @dataclass(frozen=True)
@@ -112,14 +95,14 @@ class Certifier:
 
     def __init__(self, problem: Problem, root: Root | None = None) -> None:
         self.problem, self.root = problem, root or at_rest(problem)
-        self._known: list[_Played] = [_Played([], []) for _ in range(LEVELS)]
+        self._known: list[_Played] = [_Played([], []) for _ in range(PLAN_CERTIFICATE.levels)]
         # by level, gait and the gait before (or any before): how a cycle went tells where to step shortly
         self._went: dict[tuple[int, int, int | None], Trajectory] = {}
 
     def certify(self, gaits: Sequence[int]) -> Certificate:
         """Judge a sequence of gaits, a cycle each."""
-        small = self.problem.margin_m < SMALL_MARGIN * self.problem.robot.length_m
-        for level in range(1, LEVELS):
+        small = self.problem.margin_m < PLAN_CERTIFICATE.small_margin * self.problem.robot.length_m
+        for level in range(1, PLAN_CERTIFICATE.levels):
             coarse, fine = self._played(gaits, (level - 1, level))
             # nodes twice as dense make integration better, not geometry
             seen = [_thinned(t, 2 ** (level - 1 if small else level)) for t in fine]
@@ -151,18 +134,19 @@ class Certifier:
     def _in_a_wall(self, cycle: Trajectory) -> bool:
         """Return whether a few bodies of a cycle tell that it overlaps a wall, whatever the error is."""
         problem = self.problem
-        few = np.linspace(0, cycle.time_s.size - 1, GLANCES).astype(int)
+        few = np.linspace(0, cycle.time_s.size - 1, PLAN_CERTIFICATE.first_bodies).astype(int)
         lines = points_in_room(centre_lines(problem.integrator, cycle.kappa[few]), cycle.pose[few])
         deepest = float(problem.body.estimate(lines).min()) + problem.field.error_m
-        return deepest < -SURE * problem.robot.length_m
+        return deepest < -PLAN_CERTIFICATE.in_wall * problem.robot.length_m
 
     def _cycle(self, gaits: Sequence[int], index: int, level: int) -> Search[Trajectory]:
         """Find one cycle, as a search, from where the one before it ends."""
         problem, known = self.problem, self._known[level]
         before, now = gaits[index - 1] if index else self.root.gait, gaits[index]
         state = known.cycles[index - 1].final if index else self.root.state
-        timeline = problem.joints.timeline(before, now, CERTIFIED_STAIR_S / FINER ** (level / 2))
-        tolerance = TOLERANCE * problem.robot.length_m / FINER**level
+        s = PLAN_CERTIFICATE
+        timeline = problem.joints.timeline(before, now, s.stair_s / s.finer ** (level / 2))
+        tolerance = s.tolerance * problem.robot.length_m / s.finer**level
         like = self._went.get((level, now, before))
         if like is None:
             like = self._known[level - 1].cycles[index] if level else self._went.get((level, now, None))
@@ -216,23 +200,23 @@ class Certifier:
             states,
         )  # fmt: skip
         if failed is None:
-            return certificate, worst <= SHARE * float(seen.min())
+            return certificate, worst <= PLAN_CERTIFICATE.error_share * float(seen.min())
         return certificate, arrived is None or bool((seen + error < wanted).any())
 
     def _error_m(self, fine: list[Trajectory], coarse: list[Trajectory]) -> tuple[Array, Array]:
         """Return instants, and the bound on the finer integration's error until then.
 
-        Errors that are RATIO apart at least differ by RATIO - 1 of the finer one at least.
+        Errors in a ratio r at least differ by r - 1 of the finer one at least.
         """
         run = self.problem.integrator
         # the finer nodes lie a millisecond apart: what a line between two of them misses is a micrometre
         time, *fine_columns, _ = _joined(fine)
-        at, pose, kappa, _ = _joined([_thinned(t, COMPARED) for t in coarse])
+        at, pose, kappa, _ = _joined([_thinned(t, PLAN_CERTIFICATE.compared) for t in coarse])
         fine_pose, fine_kappa = (linear(time, columns, at) for columns in fine_columns)
         here = points_in_room(centre_lines(run, fine_kappa), fine_pose)
         there = points_in_room(centre_lines(run, kappa), pose)
         apart = np.hypot(*(here - there).transpose(2, 0, 1)).max(axis=1)
-        return at, np.maximum.accumulate(apart) / (RATIO - 1)
+        return at, np.maximum.accumulate(apart) / (PLAN_CERTIFICATE.error_ratio - 1)
 
 
 @dataclass
@@ -272,9 +256,9 @@ def _joined(played: Sequence[Trajectory]) -> tuple[Array, Array, Array, NDArray[
 def clearances(problem: Problem, lines: Array, wanted_m: Array | float = 0.0) -> Array:
     """Return the clearance of bodies (n, points, 2).
 
-    It is exact below EXACT_BELOW, and below what is `wanted_m` of each; above, a lower bound.
+    It is exact below `exact_below`, and below what is `wanted_m` of each; above, a lower bound.
     """
-    exact_below_m = np.maximum(EXACT_BELOW * problem.robot.length_m, wanted_m)
+    exact_below_m = np.maximum(PLAN_CERTIFICATE.exact_below * problem.robot.length_m, wanted_m)
     room = problem.body.estimate(lines) - problem.field.error_m
     close = room < exact_below_m
     if close.any():

@@ -10,18 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planners.maze.places import RobotSize
+from planners.plan.settings import NARROWNESS
 from planners.search.problem import ROUNDING_M, Problem
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait
 from srs_opt.orbit.steady import steady_gait
 
 Array = NDArray[np.float64]
-NODES = 700_000
-HALVINGS = 14  # of the clearance range: 0.1 mm in a metre
-ALONG_BODY = 65  # points of the straight body whose passages are followed
-SPARE = 0.1  # of the body's width
-SLOWEST = 0.0424  # body lengths per second; a gait slower than this is none
-WEAKER = (0.85, 0.7, 0.55, 0.4)  # pressures tried outside the table, relative to its slimmest gait
 
 
 @dataclass(frozen=True)
@@ -168,7 +163,7 @@ def no_body_fits(problem: Problem) -> bool:
     half = problem.robot.body_width_m / 2
     keeps_m = half + min(problem.margin_m, problem.margin_m + problem.start_slack_m)
     start, reach = problem.start, problem.robot.length_m / 2 - half
-    along = np.linspace(-reach, reach, ALONG_BODY)
+    along = np.linspace(-reach, reach, NARROWNESS.body_points)
     body = np.stack(
         [start.x + along * math.cos(start.heading), start.y + along * math.sin(start.heading)], axis=1
     )
@@ -190,12 +185,13 @@ def no_body_fits(problem: Problem) -> bool:
 def narrower_than_any_gait(problem: Problem) -> bool:
     """Whether the widest route has a place clearly narrower than what the slimmest gait needs.
 
-    A thin gate can be passed with a little less than a gait's envelope; SPARE allows for that.
+    A thin gate can be passed with a little less than a gait's envelope; `spare_widths` allows for that.
     """
     tightest = tightest_place(problem)
-    return (
-        tightest is None or tightest.width_m < gait_needs(problem)[0][1] - SPARE * problem.robot.body_width_m
-    )
+    if tightest is None:
+        return True
+    spare_m = NARROWNESS.spare_widths * problem.robot.body_width_m
+    return tightest.width_m < gait_needs(problem)[0][1] - spare_m
 
 
 def gait_needs(problem: Problem) -> tuple[tuple[str, float], ...]:
@@ -203,7 +199,7 @@ def gait_needs(problem: Problem) -> tuple[tuple[str, float], ...]:
     needs = [
         (entry.name, sum(entry.envelope_m) + 2 * problem.margin_m)
         for entry in problem.gaits.gaits
-        if abs(entry.speed_m_s) > SLOWEST * problem.robot.length_m
+        if abs(entry.speed_m_s) > NARROWNESS.slowest * problem.robot.length_m
     ]
     return tuple(sorted(needs, key=lambda need: need[1]))
 
@@ -213,7 +209,7 @@ def tightest_place(problem: Problem) -> Tightest | None:
     from scipy.ndimage import label
 
     field = problem.field
-    stride = max(1, math.ceil(math.sqrt(field.values.size / NODES)))
+    stride = max(1, math.ceil(math.sqrt(field.values.size / NARROWNESS.nodes)))
     room = np.asarray(field.values[::stride, ::stride], dtype=float)
     spacing = field.resolution * stride
     origin = np.array(field.origin)
@@ -233,7 +229,7 @@ def tightest_place(problem: Problem) -> Tightest | None:
     region = connected(low)
     if region is None:
         return None
-    for _ in range(HALVINGS):
+    for _ in range(NARROWNESS.halvings):
         middle = (low + high) / 2
         wider = connected(middle)
         if wider is None:
@@ -311,13 +307,13 @@ def _slimmest_outside(problem: Problem, name: str) -> float | None:
     """Return what the slimmest of some weaker gaits needs; None if none of them moves."""
     model = problem.gaits[name]
     slimmest = None
-    for factor in WEAKER:
+    for factor in NARROWNESS.weaker:
         gait = Gait(model.gait.period_s, factor * model.gait.pressure_kpa, model.gait.intervals)
         try:
             orbit = steady_gait(problem.robot, gait, problem.gaits.model)
         except NoAnswerError:
             continue
-        if abs(orbit.speed_m_s) > SLOWEST * problem.robot.length_m:
+        if abs(orbit.speed_m_s) > NARROWNESS.slowest * problem.robot.length_m:
             need = sum(orbit.envelope_m) + 2 * problem.margin_m
             slimmest = min(need, slimmest or math.inf)
     return slimmest

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from planners.motion.robots import undelayed
 from planners.plan.answer import Plan
 from planners.plan.certify import clearances
+from planners.plan.settings import PLAN_CERTIFICATE
 from planners.search.problem import Problem
 from planners.search.tree import at_rest
 from srs_opt.errors import NoAnswerError
@@ -28,7 +29,6 @@ from srs_opt.simulate.batched import run_batched
 from srs_opt.simulate.shapes import centre_lines
 
 Array = NDArray[np.float64]
-THINNED = 3  # every third node, 6 ms apart: the deviations change slowly
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,8 @@ def _played(problem: Problem, plan: Plan, robot: Robot) -> tuple[Array, Array, A
     pose, kappa = [], []
     for gait in plan.gaits:
         trajectory = problem.bent(run.integrate(problem.joints.timeline(before, gait), state), before, gait)
-        seen = np.flatnonzero(trajectory.time_s + ended_s <= plan.certificate.time_s[-1] + 1e-9)[::THINNED]
+        seen = np.flatnonzero(trajectory.time_s + ended_s <= plan.certificate.time_s[-1] + 1e-9)
+        seen = seen[:: PLAN_CERTIFICATE.look_nodes]
         pose.append(trajectory.pose[seen])
         kappa.append(trajectory.kappa[seen])
         state, before, ended_s = trajectory.final, gait, ended_s + trajectory.time_s[-1]
@@ -171,7 +172,8 @@ def _closed_loop(problem: Problem, plan: Plan, tolerance: Tolerance) -> float:
             return float("-inf")
         trajectory = problem.bent(found, b, gait)
         begun_s = ends_s[k - 1] if k else 0.0
-        seen = np.flatnonzero(trajectory.time_s + begun_s <= c.time_s[-1] + 1e-9)[::THINNED]
+        seen = np.flatnonzero(trajectory.time_s + begun_s <= c.time_s[-1] + 1e-9)
+        seen = seen[:: PLAN_CERTIFICATE.look_nodes]
         pose = trajectory.pose[seen]
         body = centre_lines(problem.integrator, trajectory.kappa[seen])
         tube = tolerance.position_m + problem.bending.tube_m(pose, problem.motion.row(gait))

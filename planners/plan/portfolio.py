@@ -22,6 +22,7 @@ import numpy as np
 from planners.plan.answer import Plan, PlanResult
 from planners.plan.certify import certify
 from planners.plan.registry import OMPLS, OURS, Effort, Planner, planner_named
+from planners.plan.settings import PORTFOLIO
 from planners.plan.solve import TOO_NARROW, LatticeSolver
 from planners.search.beam import BEAM
 from planners.search.costmap import BLOCKED_S
@@ -29,15 +30,6 @@ from planners.search.ompl_setup import MISSING, has_ompl
 from planners.search.problem import Problem
 from srs_opt import plugins
 from srs_opt.interrupts import signals_deferred, workers_deaf_to_interrupts
-
-# Cycles that our searches look at in the first round, at least and per second of way; doubled every round.
-# One beam along a way of 150 s takes 3000, and the certificate may send it back a few times: with too few,
-# OMPL's planners are asked while a plan is being mended.
-FIRST_NODES, NODES_PER_S = 3000, 60.0
-LOOK_NODES = 600  # of the search over runs where the first beam has failed: corridors take it 10 to 650
-FIRST_ITERATIONS = 1000  # of another planner
-ROUNDS = 5
-WIDER = (50, 150, 500, 1500)  # beams that look for better plans
 
 
 @dataclass(frozen=True)
@@ -94,12 +86,14 @@ def _rounds(problem: Problem, request: PlanRequest, tell: Tell) -> PlanResult:
     began = time.perf_counter()
     start = np.array([problem.start.x, problem.start.y])
     way_s = float(problem.to_goal.at(start))
-    first = FIRST_NODES if way_s > BLOCKED_S / 2 else max(FIRST_NODES, round(NODES_PER_S * way_s))
-    for solver, nodes in ((lattice, first), (runs, LOOK_NODES)):
+    first = PORTFOLIO.first_nodes
+    if way_s <= BLOCKED_S / 2:
+        first = max(first, round(PORTFOLIO.nodes_per_s * way_s))
+    for solver, nodes in ((lattice, first), (runs, PORTFOLIO.run_nodes)):
         result = solver.run(nodes)
         if result.plan is not None or result.status == "infeasible":
             return result
-    for turn in range(ROUNDS):
+    for turn in range(PORTFOLIO.rounds):
         narrow = None
         for solver in ours:
             result = solver.run(first * 2**turn)
@@ -118,7 +112,7 @@ def _rounds(problem: Problem, request: PlanRequest, tell: Tell) -> PlanResult:
                 tell(f"{MISSING}: continuing with the built-in searches")
             continue
         tell(f"lattice: nothing among {ours[0].looked_at} cycles; trying OMPL's planners as well")
-        plan = _ompl_round(problem, request, FIRST_ITERATIONS * 2**turn, left)
+        plan = _ompl_round(problem, request, PORTFOLIO.first_iterations * 2**turn, left)
         if plan is not None:
             return PlanResult("solved", plan, None, 0.0, result.effort)
     return result
@@ -152,18 +146,19 @@ def _result(future: Future[tuple[int, ...] | None], left_s: float) -> tuple[int,
 def _alone(problem: Problem, request: PlanRequest, planner: Planner, tell: Tell) -> PlanResult:
     """Return the answer of one planner, in rounds with fresh seeds."""
     began = time.perf_counter()
-    for turn in range(ROUNDS):
+    for turn in range(PORTFOLIO.rounds):
         left = request.time_limit_s - (time.perf_counter() - began)
         if left <= 0:
             break
-        iterations = FIRST_ITERATIONS * 2**turn
+        iterations = PORTFOLIO.first_iterations * 2**turn
         gaits = _found(problem, planner, iterations, request.seed + turn, left)
         plan = _certified(problem, planner.name, gaits)
         if plan is not None:
             return PlanResult("solved", plan, None, 0.0, {"iterations": iterations})
         tell(f"{planner.name}: no certified plan in {iterations} iterations")
     late = time.perf_counter() - began >= request.time_limit_s
-    within = f"within the time limit of {request.time_limit_s:g} s" if late else f"in {ROUNDS} rounds"
+    limit = f"within the time limit of {request.time_limit_s:g} s"
+    within = limit if late else f"in {PORTFOLIO.rounds} rounds"
     reason = f"{planner.name} found no plan that passes the certificate {within}; other planners may"
     return PlanResult("timeout" if late else "not_found", None, reason, 0.0, {"rounds": turn + 1})
 
@@ -197,7 +192,7 @@ def _better(problem: Problem, request: PlanRequest, result: PlanResult, tell: Te
     """Search with wider beams as long as there is time; keep the cheapest plan."""
     began = time.perf_counter()
     best = result
-    for width in WIDER:
+    for width in PORTFOLIO.wider:
         left = request.time_limit_s - (time.perf_counter() - began)
         if left <= 0:
             break

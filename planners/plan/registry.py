@@ -21,12 +21,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, NamedTuple
 
-from planners.plan.solve import LEAST_SLACK, LatticeSolver, RunSolver
-from planners.search.lattice import LatticeSettings
+from planners.plan.settings import MENDING
+from planners.plan.solve import LatticeSolver, RunSolver
+from planners.search.lattice import LATTICE
 from planners.search.ompl_control import MakePlanner, as_ompl_planner, run_planner
 from planners.search.ompl_geometric import search_geometric
 from planners.search.ompl_problem import CycleSetup
@@ -36,7 +37,6 @@ from srs_opt.errors import InputError
 
 ALIASES = {"kpiece": "kpiece1"}
 CURVES = ("dubins", "rs")
-HALVINGS = 3  # of cells near walls, in the second lattice search
 # what `auto` asks, in this order; OMPL's only where our own searches have found nothing
 OURS = ("lattice", "runs", "fine")
 OMPLS = ("dubins-rrtconnect", "rs-rrtconnect", "kpiece1", "est", "rrt")
@@ -116,7 +116,9 @@ def _ours(solver: Callable[..., LatticeSolver], problem: Problem, effort: Effort
 
 def _fine(problem: Problem, **options: Any) -> LatticeSolver:
     """Return the lattice search with finer cells near walls: slower, for gaps that the first one misses."""
-    settings = LatticeSettings(most_halvings=HALVINGS, by_heading=True, slack=LEAST_SLACK)
+    settings = replace(
+        LATTICE, most_halvings=MENDING.fine_halvings, by_heading=True, slack=MENDING.least_slack
+    )
     return LatticeSolver(problem, settings, beams=(), **options)
 
 

@@ -11,21 +11,14 @@ from typing import Any
 from planners.plan.answer import Plan, PlanResult, Status
 from planners.plan.certify import Certificate, Certifier
 from planners.plan.explain import narrower_than_any_gait, no_body_fits
+from planners.plan.settings import MENDING
 from planners.search.beam import BEAM, BeamSearch, BeamSettings
 from planners.search.lattice import LATTICE, LatticeSearch, LatticeSettings
 from planners.search.problem import ROUNDING_M, Problem
 from planners.search.runs import RUNS, RunSearch, RunSettings
 from planners.search.tree import Root, at_rest
 
-CHUNK = 50  # nodes between looks at the clock
-LOOK_FIRST = 100  # nodes before the widths are looked at
 TOO_NARROW = "no way with these gaits: even the widest route is too narrow for every gait of the table"
-BACK = 3  # cycles before a failure from where the way is searched again, more at every attempt
-ATTEMPTS = 12
-MORE_SLACK = 0.00212  # body lengths
-# Of the last search: what happens between the samples of a cycle is left to the certificate. Corridors with
-# 0.2 % of a body length to spare are found with it; not at first, as more plans then have to be mended.
-LEAST_SLACK = 0.000424  # body lengths
 # what keeps hitting the posts of a narrow passage needs states told apart by millimetres
 FINE_BEAM = BeamSettings(width=40, cell=0.0424, course_rad=0.05, slack=0.000847)
 BEAMS = (BEAM, FINE_BEAM)
@@ -100,7 +93,7 @@ class LatticeSolver:
     def run(self, max_nodes: int = 400_000) -> PlanResult:
         """Return the first certified plan among `max_nodes` more cycles, or why there is none."""
         last = self.looked_at + max_nodes
-        while self.attempts < ATTEMPTS:
+        while self.attempts < MENDING.attempts:
             outcome = self._look(last)
             if isinstance(outcome, PlanResult):
                 return outcome
@@ -129,7 +122,7 @@ class LatticeSolver:
             if self._too_narrow():
                 self.ended = True
                 return self._answer("infeasible" if no_body_fits(self.problem) else "not_found", TOO_NARROW)
-            way = self.search.advance(CHUNK)
+            way = self.search.advance(MENDING.chunk)
             if way is not None:
                 return tuple(step.gait for step in way)
             if self.stop() or time.perf_counter() - self.began > self.time_limit_s:
@@ -153,7 +146,7 @@ class LatticeSolver:
 
     def _too_narrow(self) -> bool:
         """Judge the widths, once, when the search does not come on."""
-        if self.judged or self.looked_at < LOOK_FIRST or not self.search.in_doubt:
+        if self.judged or self.looked_at < MENDING.width_nodes or not self.search.in_doubt:
             return False
         self.judged = True
         return narrower_than_any_gait(self.problem)
@@ -176,7 +169,7 @@ class LatticeSolver:
                     cell=s.cell / 2,
                     course_rad=s.course_rad / 2,
                     speed=s.speed / 2,
-                    slack=LEAST_SLACK,
+                    slack=MENDING.least_slack,
                     by_heading=True,
                 )
                 self.tell("search exhausted at this resolution; searching again at half of it")
@@ -187,11 +180,11 @@ class LatticeSolver:
         """Begin again some cycles before the failure, with a little more clearance."""
         self.tell(f"certificate failed: {certificate.reason}; repairing the plan from there")
         assert certificate.failed_cycle is not None  # it has failed
-        keep = max(0, certificate.failed_cycle - BACK * self.counts["certificates"])
+        keep = max(0, certificate.failed_cycle - MENDING.back * self.counts["certificates"])
         here = self.begin
         if keep:
             here = Root(certificate.states[keep - 1], gaits[keep - 1], -ROUNDING_M)
-        self.more_slack += MORE_SLACK
+        self.more_slack += MENDING.more_slack
         self._begin_again(gaits[:keep], here)
 
     def _begin_again(self, kept: tuple[int, ...], here: Root) -> None:

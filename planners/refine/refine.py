@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from planners.motion.valves import Joint, gait_end
 from planners.plan.answer import Plan
-from planners.plan.certify import CERTIFIED_STAIR_S, TOLERANCE, certify
+from planners.plan.certify import certify
+from planners.plan.settings import PLAN_CERTIFICATE
 from planners.refine.limits import End, Limits, Values
 from planners.refine.shots import with_sensitivity
 from planners.refine.solve import Before, Found, WindowSolver
@@ -244,8 +245,9 @@ class _Refiner:
         return window
 
     def _played(self, joint: Joint, state: Array) -> Array:
-        tolerance = TOLERANCE * self.problem.robot.length_m / 16
-        return self.problem.integrator.integrate(joint.timeline(CERTIFIED_STAIR_S), state, tolerance).final
+        s = PLAN_CERTIFICATE
+        tolerance = s.tolerance * self.problem.robot.length_m / s.finer
+        return self.problem.integrator.integrate(joint.timeline(s.stair_s), state, tolerance).final
 
 
 def _until(window: Window, arrives_s: float) -> Window:

@@ -5,7 +5,8 @@ import pytest
 import shapely
 from planner_rooms import corridor, gate, maze_of
 
-from planners.plan.certify import RATIO, Certifier, certify
+from planners.plan.certify import Certifier, certify
+from planners.plan.settings import PLAN_CERTIFICATE
 from planners.plan.solve import LatticeSolver, solve_with_lattice
 from planners.search.beam import BeamSettings
 from planners.search.clearance import BodyClearance
@@ -164,7 +165,8 @@ def test_the_certificate_s_bound_covers_the_finer_integration_s_error(problem_in
     run, gait = problem.integrator, problem.gaits.gaits[0].gait
     true = run.integrate(Timeline.of_gait(gait, gait.period_s), run.rest())
     fine, coarse = (
-        [replace(true, pose=true.pose + [off_m, 0.0, 0.0])] for off_m in (finer_m, RATIO * finer_m)
+        [replace(true, pose=true.pose + [off_m, 0.0, 0.0])]
+        for off_m in (finer_m, PLAN_CERTIFICATE.error_ratio * finer_m)
     )
     _, error = Certifier(problem)._error_m(fine, coarse)
     assert error == pytest.approx(finer_m, rel=1e-6)
