@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from dart_snake.bending import Lags, respond
 from dart_snake.engine import STEP_S, Motion, Snake
 from planners.drive.execute import Drive, Execution
+from planners.drive.settings import DEFAULT_DRIVE
 from planners.motion.robots import undelayed
 from planners.plan.answer import Plan
 from planners.search.problem import Problem
@@ -26,7 +27,6 @@ from srs_opt.simulate.integrate import Integrator, Trajectory
 from srs_opt.simulate.timeline import Timeline
 
 Array = NDArray[np.float64]
-ROW_STEPS = 5  # steps from one look at the body to the next
 
 
 class EnginePlant:
@@ -62,7 +62,7 @@ class EnginePlant:
         tau = (self.robot.tau1_s, self.robot.tau2_s)
         before = self._snake.look()
         curvature, rate, self._lags = respond(self._lags, timeline.duration_s, drive, tau, times)
-        seen = self._snake.play(curvature, rate, ROW_STEPS)
+        seen = self._snake.play(curvature, rate, DEFAULT_DRIVE.engine_steps)
         self._rate = rate[-1]
         for touched in seen.touched:
             self.contacts += bool(touched and not self._touching)

@@ -57,6 +57,9 @@ class EnsembleSettings:
         keep more members, and with them more room from walls.
     enough_margins : float
         Of the margin: what leaves so much room with every possible member is good enough.
+    coast_s : float
+        How long a halt is simulated on after the valves have been vented. Shorter does not see a body touch
+        that rolls on.
     """
 
     frictions: tuple[tuple[float, float], ...] = (
@@ -76,6 +79,7 @@ class EnsembleSettings:
     plausible: float = 1.0
     times: float = 3.0
     enough_margins: float = 0.5
+    coast_s: float = 1.5
 
 
 DEFAULT_ENSEMBLE = EnsembleSettings()

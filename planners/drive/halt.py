@@ -12,8 +12,6 @@ from planners.drive.friction_ensemble import FrictionEnsemble
 from srs_opt.model.state import FORWARD
 from srs_opt.simulate.timeline import Timeline
 
-COAST_S = 1.5  # watched after the valves have been vented
-
 
 def halt(ensemble: FrictionEnsemble, state: NDArray[np.float64], before: int) -> Timeline:
     """Return the valves' timeline that brings the robot to rest farthest from the walls.
@@ -27,8 +25,8 @@ def halt(ensemble: FrictionEnsemble, state: NDArray[np.float64], before: int) ->
         Gait of the cycle that ends now, or rest.
     """
     problem = ensemble.problem
-    joints = problem.joints
-    vent = joints.vent(before, COAST_S)
+    joints, coast_s = problem.joints, ensemble.settings.coast_s
+    vent = joints.vent(before, coast_s)
     best, most_m = vent, ensemble.least_room_m(state, vent)
     forward = float(state[FORWARD]) > 0
     possible = np.flatnonzero(problem.motion.may_follow(before))
@@ -40,7 +38,7 @@ def halt(ensemble: FrictionEnsemble, state: NDArray[np.float64], before: int) ->
             break
         for gait in map(int, gaits):
             first, more = joints.timeline(before, gait), joints.timeline(gait, gait)
-            way = Timeline.join([first, *[more] * (cycles - 1), joints.vent(gait, COAST_S)])
+            way = Timeline.join([first, *[more] * (cycles - 1), joints.vent(gait, coast_s)])
             room_m = ensemble.least_room_m(state, way, most_m)
             if room_m > most_m:
                 best, most_m = way, room_m

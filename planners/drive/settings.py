@@ -44,6 +44,9 @@ class DriveSettings:
         robot brakes before it; longer: the end of a narrow way is followed into a wall.
     slowest : float
         Speed with which the time for that is reckoned at least.
+    engine_steps : int
+        Steps of the other physics engine from one look at the body to the next; contacts are told by the
+        engine at every step.
     track : TrackSettings
     """
 
@@ -62,6 +65,7 @@ class DriveSettings:
     patience: float = 3.0
     beyond: float = 0.508
     slowest: float = 0.424
+    engine_steps: int = 5
     track: TrackSettings = DEFAULT_TRACK
 
 

@@ -10,6 +10,7 @@ import shapely
 from numpy.typing import NDArray
 
 from planners.maze.places import Goal
+from planners.refine.settings import WINDOW_LIMIT
 from planners.refine.shots import WindowShot
 from planners.search.problem import Problem
 from srs_opt.manoeuvre.rows import body_points
@@ -17,14 +18,7 @@ from srs_opt.manoeuvre.settings import CONSTRAINT
 from srs_opt.model.state import FORWARD, HEADING, PLACE, X, Y
 
 Array = NDArray[np.float64]
-LOOK_S = 0.005  # between instants at which the body is measured; it moves 3 mm meanwhile
-# Body lengths. Walls farther from the body than NEAR beyond the margin do not count: a step moves it by less.
-NEAR = 0.06
-SPARE = 1.2e-3  # beyond margin and goal: for ticks, chords between the body's points, and integration
-PLACE_OFF, SPEED_OFF = 0.002, 0.1  # tolerances of a window's end: body lengths, body lengths per second
-HEADING_RAD = 0.002
-BEND = 0.15  # and of its bends: a share of the largest one, or the heading would tell little of the course
-_HAIR_M = 1e-6
+_HAIR_M = 1e-6  # of difference quotients
 
 
 @dataclass(frozen=True)
@@ -51,12 +45,12 @@ class Limits:
     slack_m : float
         By which the margin may be missed in the window's first cycle (negative; the start of the way).
     more_spare : float
-        Factor on SPARE.
+        Factor on `WindowLimitSettings.spare`.
     """
 
     def __init__(self, problem: Problem, end: End, slack_m: float = 0.0, more_spare: float = 1.0) -> None:
         self.problem, self.end, self.slack_m = problem, end, slack_m
-        self.spare_m = more_spare * SPARE * problem.robot.length_m
+        self.spare_m = more_spare * WINDOW_LIMIT.spare * problem.robot.length_m
 
     @property
     def ends(self) -> int:
@@ -78,14 +72,14 @@ class Limits:
     def _ends(self, shot: WindowShot) -> list[Values]:
         state, wanted = shot.states[-1], self.end.state
         jacobian = None if shot.sensitivity is None else shot.sensitivity[-1]
-        length = self.problem.robot.length_m
+        s, length = WINDOW_LIMIT, self.problem.robot.length_m
         lever_m = CONSTRAINT.lever * length
         if wanted is None:
             return self._arrived(state, jacobian)
         bands = [
-            (X, PLACE_OFF * length, 1.0),
-            (Y, PLACE_OFF * length, 1.0),
-            (HEADING, HEADING_RAD, lever_m),
+            (X, s.place_off * length, 1.0),
+            (Y, s.place_off * length, 1.0),
+            (HEADING, s.heading_rad, lever_m),
         ]
         found = []
         for index, tolerance, unit in bands:
@@ -93,7 +87,7 @@ class Limits:
                 value = unit * (tolerance - sign * (state[index] - wanted[index]))
                 found.append(_row(value, None if jacobian is None else -sign * unit * jacobian[index]))
         forward = 1.0 if wanted[FORWARD] >= 0 else -1.0
-        value = lever_m * (forward * (state[FORWARD] - wanted[FORWARD]) + SPEED_OFF * length)
+        value = lever_m * (forward * (state[FORWARD] - wanted[FORWARD]) + s.speed_off * length)
         found.append(_row(value, None if jacobian is None else lever_m * forward * jacobian[FORWARD]))
         return found + self._bends(shot, jacobian)
 
@@ -106,7 +100,7 @@ class Limits:
         for k, index in enumerate(range(where.start, where.stop)):
             off = shot.states[-1, index] - wanted[k]
             for sign in (1.0, -1.0):
-                value = bend_m2 * (BEND * largest - sign * off)
+                value = bend_m2 * (WINDOW_LIMIT.bend * largest - sign * off)
                 found.append(_row(value, None if jacobian is None else -sign * bend_m2 * jacobian[index]))
         return found
 
@@ -117,7 +111,7 @@ class Limits:
         if goal.heading is not None:
             off = (state[HEADING] - goal.heading + np.pi) % (2 * np.pi) - np.pi
             for sign in (1.0, -1.0):
-                value = lever_m * (0.99 * goal.heading_tolerance - sign * off)
+                value = lever_m * (WINDOW_LIMIT.heading_share * goal.heading_tolerance - sign * off)
                 found.append(_row(value, None if jacobian is None else -sign * lever_m * jacobian[HEADING]))
         return found
 
@@ -127,7 +121,7 @@ class Limits:
         looked = [_looks(shot) for shot in shots]
         bodies = [body_points(run, shot.states[at], None)[0] for shot, at in zip(shots, looked)]
         wanted = [self._wanted(shot, at) for shot, at in zip(shots, looked)]
-        near_m = NEAR * problem.robot.length_m
+        near_m = WINDOW_LIMIT.near * problem.robot.length_m
         chosen, points = [], []
         for body, margin in zip(bodies, wanted):
             rough = problem.field.clearance(body) - margin[:, None]
@@ -194,6 +188,6 @@ def _row(value: float, jacobian: Array | None) -> Values:
 
 def _looks(shot: WindowShot) -> NDArray[np.int64]:
     """Return the nodes at which the body is measured."""
-    wanted = np.arange(0.0, shot.time_s[-1], LOOK_S)
+    wanted = np.arange(0.0, shot.time_s[-1], WINDOW_LIMIT.look_s)
     nodes = np.searchsorted(shot.time_s, wanted - 1e-9).clip(max=shot.time_s.size - 1)
     return np.unique(np.append(nodes, shot.time_s.size - 1))

@@ -20,6 +20,7 @@ from planners.plan.answer import Plan
 from planners.plan.certify import certify
 from planners.plan.settings import PLAN_CERTIFICATE
 from planners.refine.limits import End, Limits, Values
+from planners.refine.settings import WINDOW
 from planners.refine.shots import with_sensitivity
 from planners.refine.solve import Before, Found, WindowSolver
 from planners.refine.ticks import on_ticks
@@ -28,19 +29,9 @@ from planners.search.problem import Problem
 from planners.search.tree import at_rest
 from srs_opt.errors import InputError, NoAnswerError
 from srs_opt.manoeuvre.order import standing_s
-from srs_opt.orbit.sensitivity import actuator_rates
-from srs_opt.simulate.integrate import Integrator
 
 Array = NDArray[np.float64]
 Tell = Callable[[str], None]
-CYCLES, KEPT = 6, 3  # of a window, and how many of them are kept when it moves on
-STEPS = 28  # of a window; half of it gains a fifth less in half the time
-# Steps at most per second of the plan, mending included: about 5 s of processor time. They are counted, so
-# that what is found does not depend on the machine.
-STEPS_PER_S = 26.0
-LEAST_STEPS = 6  # of a window that is mended; fewer leave it where it was
-SPARES = (1.0, 2.5, 5.0)  # of what is optimized from there on, every time that the certificate refuses
-LEAST_GAIN_S = 0.01
 
 
 @dataclass(frozen=True)
@@ -92,17 +83,22 @@ def check_refinable(problem: Problem) -> None:
     ------
     InputError
         If cycles are bent by measured factors, something else than time shall be small, or the actuators are
-        not linear in pressure.
+        not linear in pressure or depend on a gait's frequency.
     """
     if not problem.bending.none:
         raise InputError("--refine optimizes the model's own motion: expected no --drive beside it")
     if problem.cost != "time":
         raise InputError(f"--refine shortens the time: expected --cost time beside it, found {problem.cost}")
-    run = problem.integrator
-    if not run.actuator.linear or _knows_frequency(run):
+    actuator, name = problem.integrator.actuator, problem.robot.name
+    if actuator.by_frequency:
         raise InputError(
-            f"--refine: the actuators of robot '{problem.robot.name}' have an effect that is not linear or "
-            "depends on the frequency; expected a robot without it"
+            f"--refine: effect '{actuator.by_frequency[0]}' of robot '{name}' goes by a gait's frequency, "
+            "which cycles of their own duration do not have; expected a robot without it"
+        )
+    if not actuator.linear:
+        raise InputError(
+            f"--refine: the actuators of robot '{name}' have an effect that is not linear; expected a robot "
+            "without it"
         )
 
 
@@ -111,7 +107,7 @@ def refine(problem: Problem, plan: Plan, tell: Tell = lambda message: None) -> R
     began = time.process_time()
     reason = "nothing faster was found"
     refiner = _Refiner(problem, plan, tell)
-    for spare in SPARES:
+    for spare in WINDOW.spares:
         try:
             own = refiner.cycles(spare)
         except NoAnswerError as error:
@@ -123,7 +119,7 @@ def refine(problem: Problem, plan: Plan, tell: Tell = lambda message: None) -> R
         certificate = certify(known, numbers)
         if certificate.passed:
             better = Plan(plan.planner, numbers, certificate)
-            if better.duration_s < plan.duration_s - LEAST_GAIN_S:
+            if better.duration_s < plan.duration_s - WINDOW.least_gain_s:
                 return Refinement(known, better, "", plan.duration_s, time.process_time() - began)
             reason = "nothing faster was found"
             break
@@ -132,14 +128,6 @@ def refine(problem: Problem, plan: Plan, tell: Tell = lambda message: None) -> R
         assert certificate.failed_cycle is not None  # it has failed
         refiner.back_to(certificate.failed_cycle)
     return Refinement(problem, plan, reason, plan.duration_s, time.process_time() - began)
-
-
-def _knows_frequency(run: Integrator) -> bool:
-    """Return whether the actuators depend on how often a gait repeats itself."""
-    rates, rest = actuator_rates(run.structure), run.rest()[run.layout.actuator]
-    valves = np.ones(run.structure.segments)
-    one, other = (np.asarray(rates(rest, valves, run.pack(40.0, frequency))) for frequency in (1.0, 2.0))
-    return not np.allclose(one, other)
 
 
 @dataclass(frozen=True)
@@ -167,7 +155,7 @@ class _Refiner:
         kpa = [entry.gait.pressure_kpa for entry in problem.gaits.gaits]
         self.pressures = min(kpa), max(kpa)
 
-        self.steps_left = round(STEPS_PER_S * plan.duration_s)
+        self.steps_left = round(WINDOW.steps_per_s * plan.duration_s)
         segments = problem.robot.segments
         at_start = Before((0,) * segments, (np.inf,) * segments)
         self.places = [_Place((), tuple(self.planned), at_rest(problem).state, at_start)]
@@ -189,7 +177,7 @@ class _Refiner:
         while True:
             here = self.places[-1]
             first, guess = len(here.kept), list(here.guess)
-            size = min(CYCLES, count - first)
+            size = min(WINDOW.cycles, count - first)
             last = first + size == count
             window = Window.of_cycles(guess[:size], problem.joints.limits)
             if not first:
@@ -206,7 +194,7 @@ class _Refiner:
                 solver.tail_s = standing_s(guess[size].gait, problem.joints.limits.dwell_s)
             found = solver.solve(window, self._steps(count - first))
             self.steps_left -= solver.steps
-            now = size if last else KEPT
+            now = size if last else WINDOW.kept
             window = self._rounded(solver, found, now)
             if last:
                 window = _with_rest(
@@ -227,9 +215,9 @@ class _Refiner:
 
     def _steps(self, cycles: int) -> int:
         """Return how many steps the next window may take, with so many cycles to go."""
-        windows = 1 + max(0, math.ceil((cycles - CYCLES) / KEPT))
-        steps = min(STEPS, self.steps_left // windows)
-        if steps < LEAST_STEPS:
+        windows = 1 + max(0, math.ceil((cycles - WINDOW.cycles) / WINDOW.kept))
+        steps = min(WINDOW.steps, self.steps_left // windows)
+        if steps < WINDOW.least_steps:
             raise NoAnswerError("the steps that were allowed have been taken")
         return steps
 

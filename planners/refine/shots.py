@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from planners.refine.settings import WINDOW
 from planners.refine.window import Window
 from srs_opt.errors import NoAnswerError
 from srs_opt.manoeuvre.certificate import seen_states
@@ -20,8 +21,6 @@ from srs_opt.simulate.integrate import Integrator
 from srs_opt.simulate.kernel import Course
 
 Array = NDArray[np.float64]
-# Of the integration, body lengths per second; four times as much leaves derivatives off by a tenth at times
-TOLERANCE = 1.27e-5
 
 
 @dataclass(frozen=True)
@@ -48,7 +47,7 @@ class WindowShot:
 
 def shoot_windows(run: Integrator, start: Array, windows: list[Window]) -> list[WindowShot | None]:
     """Simulate several windows from one state, side by side; None where the model cannot go on."""
-    tolerance = TOLERANCE * run.robot.length_m
+    tolerance = WINDOW.tolerance * run.robot.length_m
     found = run_batched([run.travel(window.timeline(), start, tolerance) for window in windows])
     return [
         None

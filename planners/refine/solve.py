@@ -11,6 +11,7 @@ from scipy.optimize import linprog
 
 from planners.motion.valves import ValveLimits
 from planners.refine.limits import Limits, Values
+from planners.refine.settings import WINDOW_STEP
 from planners.refine.shots import WindowShot, shoot_windows, with_sensitivity
 from planners.refine.window import Window
 from srs_opt.errors import NoAnswerError
@@ -18,13 +19,6 @@ from srs_opt.manoeuvre.order import OrderRows
 from srs_opt.simulate.integrate import Integrator
 
 Array = NDArray[np.float64]
-PENALTY_PER_M = 20.0  # seconds per metre of violation: half a metre per second costs 2
-FRACTIONS = (1.0, 0.5, 0.2, 0.05)  # of a step, simulated side by side
-REACH_S, LEAST_REACH_S, MOST_REACH_S = 0.01, 5e-4, 0.04
-PRESSURE_PER_S = 100.0  # kPa that a step may change per second of reach
-STRETCH = 4.0  # times the reach, that a cycle may be stretched by
-GAIN_S = 5e-4  # a step that gains less is idle
-MOST_IDLE = 2
 
 
 @dataclass(frozen=True)
@@ -82,7 +76,7 @@ class WindowSolver:
     def _judged(shot: WindowShot, values: Values) -> Found:
         missed = np.minimum(values.values, 0.0)
         # many rows tell of one overlap: the worst counts, and a little of the others
-        penalty = PENALTY_PER_M * (3 * missed.min(initial=0.0) + missed.sum() / 30)
+        penalty = WINDOW_STEP.penalty_per_m * (3 * missed.min(initial=0.0) + missed.sum() / 30)
         return Found(shot, values, shot.window.ends_s[-1] - float(penalty), float(-missed.min(initial=0.0)))
 
     def solve(self, window: Window, most: int) -> Found:
@@ -96,9 +90,9 @@ class WindowSolver:
         (best,) = self.judge([window])
         if best is None:
             raise NoAnswerError("the plan cannot be simulated")
-        reach, idle = REACH_S, 0
+        reach, idle = WINDOW_STEP.first_reach_s, 0
         for _ in range(most):
-            if reach < LEAST_REACH_S or idle > MOST_IDLE:
+            if reach < WINDOW_STEP.least_reach_s or idle > WINDOW_STEP.most_idle:
                 break
             self.steps += 1
             found = self._around(best, reach)
@@ -107,11 +101,15 @@ class WindowSolver:
             f, trial = found
             gain = best.merit - trial.merit
             if gain <= 0:
-                reach *= 0.25
+                reach *= WINDOW_STEP.shrink
                 continue
             best = trial
-            idle = idle + 1 if gain < GAIN_S else 0
-            reach = min(2 * reach, MOST_REACH_S) if f == 1.0 else max(1.5 * f * reach, LEAST_REACH_S)
+            idle = idle + 1 if gain < WINDOW_STEP.gain_s else 0
+            s = WINDOW_STEP
+            if f == 1.0:
+                reach = min(s.grow * reach, s.most_reach_s)
+            else:
+                reach = max(1.5 * f * reach, s.least_reach_s)
         return best
 
     def _around(self, best: Found, reach: float) -> tuple[float, Found] | None:
@@ -125,8 +123,10 @@ class WindowSolver:
         if step is None:
             return None
         x = shot.window.unknowns()
-        tried: list[tuple[float, Window]] = [(f, shot.window.moved(x + f * step)) for f in FRACTIONS]
-        found = list(zip(FRACTIONS, self.judge([window for _, window in tried])))
+        tried: list[tuple[float, Window]] = [
+            (f, shot.window.moved(x + f * step)) for f in WINDOW_STEP.fractions
+        ]
+        found = list(zip(WINDOW_STEP.fractions, self.judge([window for _, window in tried])))
         again = []
         for f, trial in found[:-1]:
             if trial is not None:
@@ -150,15 +150,15 @@ class WindowSolver:
         values, jacobian = values[keep], rows.jacobian[keep]
         n, m, ends = window.size, values.size, window.switches + window.cycles
         by_cycles = window.by_cycles()
-        cost = np.concatenate([by_cycles[ends - 1], np.full(m, PENALTY_PER_M)])
+        cost = np.concatenate([by_cycles[ends - 1], np.full(m, WINDOW_STEP.penalty_per_m)])
         near = sparse.hstack([sparse.csr_matrix(-jacobian @ by_cycles), -sparse.identity(m)])
         order, room = self.order_rows(window)
         order = sparse.hstack([order @ by_cycles, sparse.csr_matrix((room.size, m))])
         low, high = np.full(n + m, -reach), np.full(n + m, reach)
-        low[window.switches : ends] *= STRETCH
-        high[window.switches : ends] *= STRETCH
+        low[window.switches : ends] *= WINDOW_STEP.stretch
+        high[window.switches : ends] *= WINDOW_STEP.stretch
         kpa = window.unknowns()[ends:]
-        span = PRESSURE_PER_S * reach * (self.valves.pressure_rate_kpa_s is None)
+        span = WINDOW_STEP.pressure_per_s * reach * (self.valves.pressure_rate_kpa_s is None)
         low[ends:n] = np.clip(self.pressure_kpa[0] - kpa, -span, 0.0)
         high[ends:n] = np.clip(self.pressure_kpa[1] - kpa, 0.0, span)
         low[n:], high[n:] = 0.0, np.inf

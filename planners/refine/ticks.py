@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planners.refine.limits import Values
+from planners.refine.settings import WINDOW
 from planners.refine.window import Window
 
 Array = NDArray[np.float64]
-
-TICKS_PER_M = 1e4  # a tenth of a millimetre too near is worse than a tick to the farther side
 
 
 def on_ticks(window: Window, rows: Values, cycles: int, tick_s: float) -> Window:
@@ -40,7 +39,9 @@ def on_ticks(window: Window, rows: Values, cycles: int, tick_s: float) -> Window
         near = x[column]
         x[column], values = min(
             tried,
-            key=lambda way: abs(way[0] - near) - TICKS_PER_M * tick_s * float(np.minimum(way[1], 0.0).sum()),
+            key=lambda way: (
+                abs(way[0] - near) - WINDOW.ticks_per_m * tick_s * float(np.minimum(way[1], 0.0).sum())
+            ),
         )
     begins = np.array([0.0, *x[n : n + window.cycles]])[owners]
     x[:n] = np.maximum(x[:n], begins)  # a cycle's first switch and its begin may go to different sides

@@ -16,7 +16,7 @@ from srs_opt.manoeuvre.valves import ValveRow
 from srs_opt.simulate.timeline import Timeline
 
 Array = NDArray[np.float64]
-SAME_S = 1e-9
+SAME_S = 1e-9  # instants nearer than this are one
 
 
 class Edge(NamedTuple):

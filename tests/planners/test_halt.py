@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from planner_rooms import maze_of
 
-from planners.drive.friction_ensemble import FrictionEnsemble
-from planners.drive.halt import COAST_S, halt
+from planners.drive.friction_ensemble import DEFAULT_ENSEMBLE, FrictionEnsemble
+from planners.drive.halt import halt
 from srs_opt.simulate.timeline import Timeline
 
 SPEED_M_S = 0.4
@@ -26,7 +26,7 @@ def before_wall(problem_in, robot):
 
 
 def vented(problem):
-    return Timeline.vent(problem.robot.segments, COAST_S, 0.0)
+    return Timeline.vent(problem.robot.segments, DEFAULT_ENSEMBLE.coast_s, 0.0)
 
 
 def test_vented_it_rolls_as_far_as_friction_lets_it(before_wall, robot):
@@ -46,4 +46,4 @@ def test_brakes_where_venting_would_touch(before_wall):
     assert FrictionEnsemble(problem).room_m(state, vented(problem)) <= 0
     chosen = halt(FrictionEnsemble(problem), state, problem.motion.rest)
     assert chosen.valve.any() and FrictionEnsemble(problem).room_m(state, chosen) > 0
-    assert not chosen.valve[:, -1].any() and np.isclose(chosen.duration_s[-1], COAST_S)
+    assert not chosen.valve[:, -1].any() and np.isclose(chosen.duration_s[-1], DEFAULT_ENSEMBLE.coast_s)
