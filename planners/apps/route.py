@@ -18,7 +18,7 @@ from planners.plan.inputs import check_margin, gaits_for, placed_maze, planning_
 from planners.plan.looks import Looks, looks
 from planners.plan.options import MARGIN_M
 from planners.plan.portfolio import PlanRequest, solve
-from planners.refine.refine import Refinement, refine
+from planners.refine.refine import Refinement, check_refinable, refine
 from planners.search.cost_model import Cost
 from planners.search.problem import Problem
 from srs_opt.drive.calibration import DriveCalibration
@@ -73,7 +73,15 @@ class Route(Result):
         """Return the route with all switch times of its plan optimized at once, certified afresh.
 
         The plan stays where nothing faster is found; `refinement` says why.
+
+        Raises
+        ------
+        InputError
+            If the optimization knows nothing of what the plan is for (`check_refinable`).
         """
+        problem = self.problem
+        calibrated = not problem.bending.none
+        check_refinable(problem.robot, problem.gaits.model, cost=problem.cost, calibrated=calibrated)
         found = refine(self.problem, self.plan, say)
         return Route(found.problem, replace(self.result, plan=found.plan), found)
 

@@ -6,7 +6,16 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from srs_opt.command import Answer, Parser, finite_float, make_parser, positive_float, run_command, say
+from srs_opt.command import (
+    Answer,
+    Parser,
+    chosen_model,
+    finite_float,
+    make_parser,
+    positive_float,
+    run_command,
+    say,
+)
 
 if TYPE_CHECKING:
     from planners.apps.route import Route
@@ -153,9 +162,11 @@ def run(options: argparse.Namespace) -> Answer:
     true_robot = load_robot(options.true_robot) if options.true_robot else None
     if options.judge:
         check_judge([true_robot or load_robot(options.robot)])
-    problem = problem_from(options)
     if options.refine:
-        check_refinable(problem)
+        robot = load_robot(options.robot)
+        model = chosen_model(options, robot)
+        check_refinable(robot, model, cost=options.cost, calibrated=options.drive is not None)
+    problem = problem_from(options)
     request = PlanRequest(options.planner, options.seed, options.time_limit, options.best)
     route = Route(problem, solve(problem, request, lambda message: say(options, message)))
     if options.refine and route.solved:

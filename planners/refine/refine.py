@@ -29,6 +29,9 @@ from planners.search.problem import Problem
 from planners.search.tree import at_rest
 from srs_opt.errors import InputError, NoAnswerError
 from srs_opt.manoeuvre.order import standing_s
+from srs_opt.model.parameters import Structure
+from srs_opt.model.registry import build
+from srs_opt.robot import Robot
 
 Array = NDArray[np.float64]
 Tell = Callable[[str], None]
@@ -76,20 +79,29 @@ class Refinement:
         )
 
 
-def check_refinable(problem: Problem) -> None:
+def check_refinable(robot: Robot, model: str, *, cost: str = "time", calibrated: bool = False) -> None:
     """Refuse what the optimization knows nothing of.
+
+    Parameters
+    ----------
+    robot : Robot
+    model : str
+    cost : str
+        What plans shall have little of.
+    calibrated : bool
+        Whether cycles are bent by measured factors.
 
     Raises
     ------
     InputError
-        If cycles are bent by measured factors, something else than time shall be small, or the actuators are
-        not linear in pressure or depend on a gait's frequency.
+        If cycles are bent, something else than time shall be small, or the actuators are not linear in
+        pressure or depend on a gait's frequency.
     """
-    if not problem.bending.none:
+    if calibrated:
         raise InputError("--refine optimizes the model's own motion: expected no --drive beside it")
-    if problem.cost != "time":
-        raise InputError(f"--refine shortens the time: expected --cost time beside it, found {problem.cost}")
-    actuator, name = problem.integrator.actuator, problem.robot.name
+    if cost != "time":
+        raise InputError(f"--refine shortens the time: expected --cost time beside it, found {cost}")
+    (*_, actuator), name = build(Structure.of(robot, model)), robot.name
     if actuator.by_frequency:
         raise InputError(
             f"--refine: effect '{actuator.by_frequency[0]}' of robot '{name}' goes by a gait's frequency, "
