@@ -14,6 +14,7 @@ from planners.plan.settings import NARROWNESS
 from planners.search.problem import ROUNDING_M, Problem
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait
+from srs_opt.manoeuvre.settings import REGULATOR
 from srs_opt.orbit.steady import steady_gait
 
 Array = NDArray[np.float64]
@@ -56,6 +57,8 @@ class Explanation:
         Of the straight robot at the start; what is to be kept.
     unknown_walls : bool
         Whether cells that nobody has seen are taken for walls.
+    assumed_ramp_s : float or None
+        In which every change of pressure is taken to happen, where no rate of the regulator was given.
     """
 
     tightest: Tightest | None
@@ -65,6 +68,7 @@ class Explanation:
     start_clearance_m: float
     margin_m: float
     unknown_walls: bool = False
+    assumed_ramp_s: float | None = None
 
     @property
     def too_narrow(self) -> bool:
@@ -105,6 +109,11 @@ class Explanation:
                 "So the widths alone do not rule a way out; what was tried found none, which is no proof "
                 "that there is none."
             )
+            if self.assumed_ramp_s is not None:  # in a narrow corridor a ramp costs millimetres
+                said.append(
+                    f"Every change of pressure is taken to last {self.assumed_ramp_s:g} s; a faster "
+                    "regulator (--pressure-rate, measured) may leave room for one."
+                )
             return said
         if t.width_m < self.body_needs_m:
             said.append(
@@ -147,7 +156,8 @@ def explain(problem: Problem) -> Explanation:
     unseen = (
         raster is not None and raster.unknown is not None and bool((raster.occupied & raster.unknown).any())
     )
-    return Explanation(tightest, needs, body, outside, room, problem.margin_m, unseen)
+    ramp_s = None if problem.joints.limits.pressure_rate_kpa_s else REGULATOR.settle_s
+    return Explanation(tightest, needs, body, outside, room, problem.margin_m, unseen, ramp_s)
 
 
 def no_body_fits(problem: Problem) -> bool:

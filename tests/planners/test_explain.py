@@ -5,6 +5,7 @@ import pytest
 from planner_rooms import corridor, gate, maze_of
 
 from planners.maze.raster import Raster
+from planners.motion.valves import Joints
 from planners.plan.explain import explain, gait_needs, narrower_than_any_gait, tightest_place
 from planners.view.obstruction import obstruction_figure
 from srs_opt.figures import save_figure
@@ -70,3 +71,14 @@ def test_weaker_gait_outside_the_table_is_tried(problem_in):
 def test_wide_enough_is_not_called_narrow(problem_in):
     assert not narrower_than_any_gait(problem_in(corridor(0.2)))
     assert narrower_than_any_gait(problem_in(gate(0.05)))
+
+
+def test_where_widths_allow_a_way_the_assumed_ramp_of_pressure_is_said(problem_in):
+    problem = problem_in(corridor(0.2))
+    assert "--pressure-rate" in explain(problem).in_words("no plan")
+    motion = problem.motion
+    measured = replace(motion.joints.limits, pressure_rate_kpa_s=400.0)
+    joints = Joints(problem.gaits, measured)
+    known = replace(problem, motion=replace(motion, joints=joints))
+    assert "--pressure-rate" not in explain(known).in_words("no plan")
+    assert "--pressure-rate" not in explain(problem_in(gate(0.045))).in_words("no plan")
