@@ -87,11 +87,11 @@ class MotionTable:
 
     def row(self, number: int) -> int:
         """Return the row of what is played: itself for gaits and rest, of its gait for a plan's own cycle."""
-        return number if number <= self.rest else self.origin[number - self.rest - 1]
+        return int(self.row_of[number])
 
     @cached_property
     def row_of(self) -> Numbers:
-        """Row of everything that is played, by its number; see `row`."""
+        """Row of everything that is played, by its number: gaits, rest, then the cycles made for one plan."""
         return np.array([*range(self.rest + 1), *self.origin])
 
     def rows(self, numbers: Sequence[int]) -> tuple[int, ...]:

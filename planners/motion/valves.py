@@ -52,6 +52,11 @@ class ValveLimits:
         """Least dwell in whole ticks."""
         return math.ceil(self.min_dwell_s / self.tick_s - 1e-6) * self.tick_s
 
+    @property
+    def assumed_ramp_s(self) -> float | None:
+        """How long every change of pressure is taken to last where the regulator's rate is not given."""
+        return REGULATOR.settle_s if self.pressure_rate_kpa_s is None else None
+
     def ramp_s(self, from_kpa: float, to_kpa: float) -> float:
         """Return how long a change of pressure takes."""
         if from_kpa == to_kpa:

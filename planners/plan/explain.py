@@ -14,7 +14,6 @@ from planners.plan.settings import NARROWNESS
 from planners.search.problem import ROUNDING_M, Problem
 from srs_opt.errors import NoAnswerError
 from srs_opt.gait import Gait
-from srs_opt.manoeuvre.settings import REGULATOR
 from srs_opt.orbit.steady import steady_gait
 
 Array = NDArray[np.float64]
@@ -75,17 +74,22 @@ class Explanation:
         """Whether the tightest place is narrower than what the slimmest gait of the table needs."""
         return self.tightest is None or self.tightest.width_m < self.needs[0][1]
 
+    @property
+    def start_too_near(self) -> bool:
+        """Whether the straight robot breaks the margin at the start."""
+        return self.start_clearance_m < self.margin_m - ROUNDING_M
+
     def in_words(self, what: str | None) -> str:
         """Return the explanation in a few sentences, `what` first."""
         said = self._sentences(what)
-        if self.unknown_walls and self.start_clearance_m >= self.margin_m - ROUNDING_M:
+        if self.unknown_walls and not self.start_too_near:
             said.append("Cells that nobody has seen count as walls (--unknown free: as free).")
         return " ".join(said).strip()
 
     def _sentences(self, what: str | None) -> list[str]:
         said = [f"{what}." if what else ""]
         t = self.tightest
-        if self.start_clearance_m < self.margin_m - ROUNDING_M:
+        if self.start_too_near:
             said.append(
                 f"The start breaks the margin: the straight robot is {1e3 * self.start_clearance_m:.1f} mm "
                 f"from a wall there, and {1e3 * self.margin_m:.1f} mm are to be kept; move the start or "
@@ -156,7 +160,7 @@ def explain(problem: Problem) -> Explanation:
     unseen = (
         raster is not None and raster.unknown is not None and bool((raster.occupied & raster.unknown).any())
     )
-    ramp_s = None if problem.joints.limits.pressure_rate_kpa_s else REGULATOR.settle_s
+    ramp_s = problem.joints.limits.assumed_ramp_s
     return Explanation(tightest, needs, body, outside, room, problem.margin_m, unseen, ramp_s)
 
 

@@ -96,9 +96,10 @@ def adapted(
     last_attempt = (attempts or settings.attempts) - 1
     attempt = halvings = 0
     while True:
-        request = StepRequest(
-            first.kernel, first.x, mesh.repeated(pieces, valve.shape[1]), np.tile(valve, pieces), first.p
-        )
+        repeated, held = mesh, valve
+        if pieces > 1:
+            repeated, held = mesh.repeated(pieces, valve.shape[1]), np.tile(valve, pieces)
+        request = StepRequest(first.kernel, first.x, repeated, held, first.p)
         try:
             states, errors = yield from finite_steps(request)
         except NonFiniteMotionError:
